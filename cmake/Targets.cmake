@@ -1,0 +1,41 @@
+# Headers are included as "wienertree/<folder>/<name>.hpp", in the source tree as after install.
+file(MAKE_DIRECTORY ${PROJECT_BINARY_DIR}/include)
+file(CREATE_LINK ${PROJECT_SOURCE_DIR}/src ${PROJECT_BINARY_DIR}/include/wienertree SYMBOLIC)
+
+add_library(wienertree_build_settings INTERFACE)
+target_compile_options(wienertree_build_settings INTERFACE
+  -Wall -Wextra -Wpedantic -Wconversion -Wshadow -Werror)
+if(WIENERTREE_SANITIZE)
+  target_compile_options(wienertree_build_settings INTERFACE
+    -fsanitize=${WIENERTREE_SANITIZE} -fno-omit-frame-pointer -fno-sanitize-recover=all)
+  target_link_options(wienertree_build_settings INTERFACE -fsanitize=${WIENERTREE_SANITIZE})
+endif()
+
+# wienertree_room(<name> <sources>...): one folder of src/ as a static library. The arrows of the house go one way
+# (filter -> tree -> cubature -> model) and each room links only the rooms below it.
+function(wienertree_room name)
+  add_library(wienertree_${name} STATIC ${ARGN})
+  add_library(wienertree::${name} ALIAS wienertree_${name})
+  set_target_properties(wienertree_${name} PROPERTIES EXPORT_NAME ${name})
+  target_compile_features(wienertree_${name} PUBLIC cxx_std_20)
+  target_include_directories(wienertree_${name} PUBLIC
+    $<BUILD_INTERFACE:${PROJECT_BINARY_DIR}/include>
+    $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}>)
+  target_link_libraries(wienertree_${name} PRIVATE $<BUILD_INTERFACE:wienertree_build_settings>)
+endfunction()
+
+# wienertree_test(<name> LIBS <targets>... SOURCES <files>... [LABELS <labels>...]): one Catch2 program, one ctest entry.
+function(wienertree_test name)
+  cmake_parse_arguments(ARG "" "TIMEOUT" "LIBS;SOURCES;LABELS" ${ARGN})
+  add_executable(test_${name} ${ARG_SOURCES})
+  target_link_libraries(test_${name} PRIVATE ${ARG_LIBS} wienertree_catch_main wienertree_build_settings)
+  target_include_directories(test_${name} PRIVATE ${PROJECT_SOURCE_DIR}/tests)
+  target_compile_definitions(test_${name} PRIVATE WIENERTREE_SOURCE_DIR="${PROJECT_SOURCE_DIR}")
+  add_test(NAME ${name} COMMAND test_${name})
+  if(ARG_LABELS)
+    set_tests_properties(${name} PROPERTIES LABELS "${ARG_LABELS}")
+  endif()
+  if(ARG_TIMEOUT)
+    set_tests_properties(${name} PROPERTIES TIMEOUT ${ARG_TIMEOUT})
+  endif()
+endfunction()

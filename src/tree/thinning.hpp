@@ -1,0 +1,59 @@
+#pragma once
+/// Seam 3: a weighted measure in, a smaller weighted measure on some of the same nodes out.
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <string_view>
+#include <vector>
+
+#include "wienertree/model/batch.hpp"
+#include "wienertree/tree/random.hpp"
+
+namespace wienertree {
+
+enum class ThinningMethod { none, tbba, multinomial, residual, stratified, systematic, recombination };
+/// Order in which the random methods visit the sites: as they lie in the tree, or sorted in space (by x for d
+/// = 1, along a Hilbert curve for d > 1). Spatial order turns an error of N^{-1/2} into about N^{-1} in d
+/// = 1.
+enum class SiteOrder { tree, spatial };
+
+/// The sites kept, with log-weights of the same total mass as the input. Buffers are reused from call to
+/// call.
+struct Selection {
+  std::vector<std::uint32_t> site;   ///< ascending in the order the method visited them; no site twice
+  std::vector<double> log_weight;    ///< one per kept site
+  std::vector<std::uint32_t> count;  ///< particles per kept site for the methods that count; empty otherwise
+  /// Deterministic methods: what was discarded, sum over patches of mass times the l1 change of the moments
+  /// of the first degree that is not kept, in patch coordinates, relative to the total mass. 0 for random
+  /// methods.
+  double discarded = 0;
+};
+
+/// The sites: states x (d x M), and log-weights (M). A site of log-weight -infinity is never kept. In tree
+/// order, site index m = branch * parents + parent (children of one branch are contiguous), and is visited
+/// parent by parent.
+struct Sites {
+  ConstBatchView x;
+  std::span<const double> log_weight;
+  std::size_t parents = 0;  ///< 0: visit in storage order
+};
+
+class Thinning {
+ public:
+  virtual ~Thinning() = default;
+  /// @param budget N >= 1: number of particles, or of nodes kept at most for deterministic methods
+  /// @throws RunError if no weight is positive, or one is NaN or +infinity
+  virtual void thin(const Sites& sites, std::size_t budget, const RandomStream& random, Selection& out) = 0;
+  virtual std::string_view name() const = 0;
+  virtual bool deterministic() const { return false; }
+};
+
+struct ThinningOptions {
+  ThinningMethod method = ThinningMethod::tbba;
+  SiteOrder order = SiteOrder::spatial;
+  int recombination_degree = 0;  ///< moments kept by `recombination`; 0: chosen from d and the budget
+};
+
+std::unique_ptr<Thinning> make_thinning(const ThinningOptions& options);
+
+}  // namespace wienertree
