@@ -27,6 +27,10 @@ struct Selection {
   /// of the first degree that is not kept, in patch coordinates, relative to the total mass. 0 for random
   /// methods.
   double discarded = 0;
+  /// d x (kept sites), column n the state of the n-th kept site, when the method places nodes anew (Gauss
+  /// reduction, d = 1); 0 nodes when the sites keep their own states. `site` then names a site next to the
+  /// new node, each at most once: parent and branch come from it, the state from here.
+  Batch moved_states;
 };
 
 /// The sites: states x (d x M), and log-weights (M). A site of log-weight -infinity is never kept. In tree
