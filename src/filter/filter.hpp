@@ -1,0 +1,93 @@
+#pragma once
+/// Seam 5: consumes observation windows, yields posteriors.
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string_view>
+
+#include "wienertree/cubature/flow.hpp"
+#include "wienertree/cubature/formula.hpp"
+#include "wienertree/filter/functional.hpp"
+#include "wienertree/filter/posterior.hpp"
+#include "wienertree/filter/window.hpp"
+#include "wienertree/model/model.hpp"
+#include "wienertree/tree/generation.hpp"
+#include "wienertree/tree/thinning.hpp"
+
+namespace wienertree {
+
+/// Counters since the start of a filter; a run's report is made of them.
+struct FilterStatistics {
+  FlowStatistics flow;
+  std::uint64_t steps = 0;
+  std::uint64_t children = 0;       ///< nodes grown, over all steps
+  std::uint64_t dropped_nodes = 0;  ///< nodes that could not be moved and were dropped, as asked
+  double discarded = 0;             ///< sum of Selection::discarded over the steps
+};
+
+/// One step each: `advance` takes the next window, `posterior` is the law at its end.
+class Filter {
+ public:
+  virtual ~Filter() = default;
+  /// @throws RunError naming step, time and observation when no node has positive weight; naming step, time,
+  /// node and state when a node cannot be moved
+  virtual void advance(const ObservationWindow& window) = 0;
+  /// Valid until the next `advance`.
+  virtual const Posterior& posterior() = 0;
+  virtual std::string_view name() const = 0;
+  /// The current generation of nodes and how it came from the one before, for filters that keep nodes, else
+  /// nullptr.
+  virtual const Generation* generation() const { return nullptr; }
+  const FilterStatistics& statistics() const { return statistics_; }
+
+ protected:
+  FilterStatistics statistics_;
+};
+
+enum class FilterMethod { klv, full_tree, benes };
+
+/// Which weights decide where the particles go (Crisan, Ortiz-Latorre 2013, versions 1 and 2).
+enum class PruneWeights {
+  cubature,    ///< cubature weights alone; likelihoods are carried along
+  likelihood,  ///< cubature weights times likelihoods
+};
+
+enum class OnNodeFailure { stop, drop };
+
+struct FilterOptions {
+  FilterMethod method = FilterMethod::klv;
+  CubatureFormula formula;   ///< tree methods: dimension p of the model
+  std::size_t nodes = 1000;  ///< N
+  ThinningOptions thinning;
+  PruneWeights prune_weights = PruneWeights::likelihood;
+  FunctionalMethod functional = FunctionalMethod::second_order;
+  FlowMethod flow = FlowMethod::automatic;
+  FlowTolerance tolerance;
+  OnNodeFailure on_node_failure = OnNodeFailure::stop;
+  std::uint64_t seed = 1;
+  std::uint32_t launch = 0;
+  unsigned threads = 1;
+  /// An unpruned tree is refused before a step that would need more memory than this, in bytes.
+  double memory_limit = 4.0e9;
+};
+
+/// The model is copied (its fields are shared). @throws InputError if an option does not fit the model or
+/// another option
+std::unique_ptr<Filter> make_filter(const Model& model, const FilterOptions& options);
+
+/// Bytes that `steps` steps of an unpruned tree need for their last two generations, and the number of leaves
+/// c^steps.
+struct UnprunedSize {
+  double leaves, bytes;
+};
+UnprunedSize unpruned_size(const CubatureFormula& formula, std::size_t state_dimension,
+                           std::size_t observation_dimension, std::size_t steps);
+/// @throws InputError with the tree's size and the options that avoid it, if it exceeds options.memory_limit
+void refuse_oversized_tree(const Model& model, const FilterOptions& options, std::size_t steps);
+
+/// Runs the filter over all windows and hands each posterior to `observe` (may be empty).
+void run(Filter& filter, const ObservationWindows& windows,
+         const std::function<void(const Posterior&)>& observe);
+
+}  // namespace wienertree

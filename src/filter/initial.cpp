@@ -1,0 +1,84 @@
+#include "wienertree/filter/initial.hpp"
+
+#include <fmt/format.h>
+
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <cmath>
+
+#include "wienertree/cubature/construct.hpp"
+
+namespace wienertree {
+namespace {
+
+constexpr double reach = 6.0;  // mass beyond 6 standard deviations: 2e-9
+
+// Columns are standard normal points in R^r with log-weights, normalised to mass one.
+struct StandardLaw {
+  Eigen::MatrixXd points;
+  Eigen::VectorXd log_weight;
+};
+
+StandardLaw tensor_grid(Eigen::Index r, Eigen::Index per_axis) {
+  Eigen::Index total = 1;
+  for (Eigen::Index i = 0; i < r; ++i) total *= per_axis;
+  StandardLaw law{Eigen::MatrixXd(r, total), Eigen::VectorXd(total)};
+  const double spacing = 2 * reach / static_cast<double>(per_axis - 1);
+  for (Eigen::Index n = 0; n < total; ++n) {
+    Eigen::Index rest = n;
+    for (Eigen::Index i = 0; i < r; ++i, rest /= per_axis)
+      law.points(i, n) = -reach + spacing * static_cast<double>(rest % per_axis);
+    law.log_weight(n) = -law.points.col(n).squaredNorm() / 2;
+  }
+  law.log_weight.array() -= std::log(law.log_weight.array().exp().sum());
+  return law;
+}
+
+StandardLaw cubature_points(Eigen::Index r) {
+  const GaussianCubature rule = gaussian_cubature_5(static_cast<int>(r));
+  return {rule.points, rule.weights.array().log().matrix()};
+}
+
+}  // namespace
+
+Generation first_generation(const Model& model, std::size_t nodes) {
+  const std::size_t d = model.state_dimension();
+  Generation g;
+  if (!model.initial_law) {
+    g.states.reshape(d, 1);
+    std::copy(model.initial.begin(), model.initial.end(), g.states.view().data());
+    g.log_weight = {0.0};
+    return g;
+  }
+  const InitialLaw& law = *model.initial_law;
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> axes(law.covariance);
+  const Eigen::VectorXd& variance = axes.eigenvalues();
+  const double largest = std::max(0.0, variance.maxCoeff());
+  // An eigenvalue of a symmetric matrix is computed to about d eps times the largest one.
+  const double negligible = 1e-14 * static_cast<double>(d) * largest;
+  if (variance.minCoeff() < -negligible)
+    throw InputError("the covariance of the initial law is not positive semidefinite", "model " + model.name,
+                     fmt::format("eigenvalue {}", variance.minCoeff()));
+  const Eigen::Index r = (variance.array() > negligible).count();
+  Eigen::MatrixXd root(variance.size(), r);  // eigenvalues ascend: the last r columns span the law
+  for (Eigen::Index i = 0; i < r; ++i)
+    root.col(i) =
+        axes.eigenvectors().col(variance.size() - r + i) * std::sqrt(variance(variance.size() - r + i));
+  StandardLaw standard;
+  if (r == 0) {
+    standard = {Eigen::MatrixXd(0, 1), Eigen::VectorXd::Zero(1)};
+  } else {
+    const auto per_axis = static_cast<Eigen::Index>(
+        std::floor(std::pow(static_cast<double>(nodes), 1.0 / static_cast<double>(r)) + 1e-9));
+    standard = per_axis >= 5 ? tensor_grid(r, per_axis) : cubature_points(r);
+  }
+  const Eigen::MatrixXd points = (root * standard.points).colwise() + law.mean;
+  g.states.reshape(d, static_cast<std::size_t>(points.cols()));
+  for (std::size_t n = 0; n < g.size(); ++n)
+    for (std::size_t i = 0; i < d; ++i)
+      g.states(i, n) = points(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(n));
+  g.log_weight.assign(standard.log_weight.data(), standard.log_weight.data() + standard.log_weight.size());
+  return g;
+}
+
+}  // namespace wienertree

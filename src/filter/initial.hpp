@@ -1,0 +1,16 @@
+#pragma once
+/// The first generation of a tree.
+#include "wienertree/model/model.hpp"
+#include "wienertree/tree/generation.hpp"
+
+namespace wienertree {
+
+/// A fixed start is one node. A Gaussian start N(m, P) of rank r is a tensor grid along the principal axes
+/// with about `nodes`^{1/r} equidistant points an axis over +-`reach` standard deviations, weighted by the
+/// density: the trapezoidal rule, which converges geometrically in the number of points for analytic
+/// integrands (Trefethen, Weideman 2014). With fewer than 5 points an axis the degree-5 Gaussian cubature
+/// takes its place.
+/// @param nodes N >= 1   @throws InputError if the covariance is not positive semidefinite
+Generation first_generation(const Model& model, std::size_t nodes);
+
+}  // namespace wienertree

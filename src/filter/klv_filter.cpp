@@ -1,0 +1,189 @@
+#include "wienertree/filter/klv_filter.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "wienertree/filter/initial.hpp"
+
+namespace wienertree {
+namespace {
+
+std::string place(const ObservationWindow& window) {
+  return fmt::format("step {}, t = {:g}", window.step, window.end);
+}
+
+std::string_view reason(FailureReason r) {
+  switch (r) {
+    case FailureReason::not_finite:
+      return "the node's state is not finite";
+    case FailureReason::tolerance_not_reached:
+      return "the node's ODE could not be solved to tolerance";
+    case FailureReason::left_bounds:
+      return "the node left the state's bounds";
+  }
+  return "";
+}
+
+}  // namespace
+
+KlvFilter::KlvFilter(const Model& model, const FilterOptions& options)
+    : model_(model),
+      options_(options),
+      functional_(make_functional(options.functional)),
+      thinning_(options.thinning.method == ThinningMethod::none ? nullptr : make_thinning(options.thinning)),
+      grower_(model_, options_.flow, options_.tolerance, options_.formula, options_.threads),
+      survivors_(first_generation(model_, options_.nodes)),
+      current_(&survivors_) {
+  if (options_.prune_weights == PruneWeights::cubature)
+    survivors_.log_likelihood.assign(survivors_.size(), 0.0);
+}
+
+std::string_view KlvFilter::name() const { return thinning_ ? "klv" : "full-tree"; }
+
+// The part of the weight that observations go to.
+std::vector<double>& KlvFilter::likelihood_of(Generation& g) const {
+  return options_.prune_weights == PruneWeights::cubature ? g.log_likelihood : g.log_weight;
+}
+
+void KlvFilter::advance(const ObservationWindow& window) {
+  observe_start(window);
+  if (window.length() > 0) {
+    grow(window);
+    weigh(window);
+    thin(window);
+  }
+  ++statistics_.steps;
+  time_ = window.end;
+  normalised_ = false;
+}
+
+// Whatever depends on the nodes at the window's start: an observation there, and the functional's first term.
+void KlvFilter::observe_start(const ObservationWindow& window) {
+  const bool here = window.at_start || window.length() == 0;
+  if (model_.observation == ObservationKind::discrete && here && !window.observation.empty()) {
+    start_term_.resize(survivors_.size());
+    model_.density->log_density(window.observation, survivors_.states, start_term_);
+    std::vector<double>& weight = likelihood_of(survivors_);
+    for (std::size_t n = 0; n < survivors_.size(); ++n) weight[n] += start_term_[n];
+    current_ = &survivors_;
+  }
+  if (model_.observation != ObservationKind::continuous) return;
+  const std::size_t k = model_.fields->sensor_dimension(), p = model_.noise_dimension();
+  sensor_.reshape(k, survivors_.size());
+  model_.fields->sensor(survivors_.states, sensor_);
+  derivative_.reshape(functional_->uses_derivative() ? k * p : 0, survivors_.size());
+  if (functional_->uses_derivative()) model_.fields->sensor_derivative(survivors_.states, derivative_);
+  start_term_.resize(survivors_.size());
+  functional_->at_start(window, sensor_, derivative_, start_term_);
+}
+
+void KlvFilter::grow(const ObservationWindow& window) {
+  grower_.grow(survivors_, window.length(), children_, failures_);
+  children_.time = window.end;
+  current_ = &children_;
+  statistics_.children += children_.size();
+  statistics_.flow = grower_.statistics();
+  if (!failures_.empty()) handle_failures(window);
+}
+
+void KlvFilter::handle_failures(const ObservationWindow& window) {
+  if (options_.on_node_failure == OnNodeFailure::stop) {
+    const NodeFailure& f = *std::min_element(failures_.begin(), failures_.end(),
+                                             [](const auto& a, const auto& b) { return a.node < b.node; });
+    throw RunError(fmt::format("{} ({} node{} failed)", reason(f.reason), failures_.size(),
+                               failures_.size() == 1 ? "" : "s"),
+                   fmt::format("{}, node {}, state {}", place(window), f.node, model_.state_names[f.state]),
+                   fmt::format("{}", f.value));
+  }
+  for (const NodeFailure& f : failures_) {
+    // A dropped node has no mass; its state is its parent's, so that nothing downstream meets a NaN.
+    children_.log_weight[f.node] = -std::numeric_limits<double>::infinity();
+    for (std::size_t i = 0; i < children_.states.components(); ++i)
+      children_.states(i, f.node) = survivors_.states(i, children_.parent[f.node]);
+  }
+  statistics_.dropped_nodes += failures_.size();
+  failures_.clear();
+}
+
+void KlvFilter::weigh(const ObservationWindow& window) {
+  const std::size_t parents = survivors_.size();
+  std::vector<double>& weight = likelihood_of(children_);
+  if (model_.observation == ObservationKind::discrete) {
+    if (window.at_start || window.observation.empty()) return;
+    weight_.resize(children_.size());
+    model_.density->log_density(window.observation, children_.states, weight_);
+    for (std::size_t n = 0; n < children_.size(); ++n) weight[n] += weight_[n];
+    return;
+  }
+  if (model_.observation == ObservationKind::none) return;
+  constexpr std::size_t block = 1024;  // nodes whose sensor values stay in cache
+  child_sensor_.reshape(sensor_.components(), std::min(block, parents));
+  for (std::size_t branch = 0; branch < options_.formula.paths.size(); ++branch)
+    for (std::size_t first = 0; first < parents; first += block) {
+      const std::size_t count = std::min(block, parents - first), child = branch * parents + first;
+      const std::span<double> w = {weight.data() + child, count};
+      for (std::size_t n = 0; n < count; ++n) w[n] += start_term_[first + n];
+      if (!functional_->uses_end()) continue;
+      const BatchView h1 = child_sensor_.view().nodes(0, count);
+      model_.fields->sensor(children_.states.view().nodes(child, count), h1);
+      functional_->at_end(window, sensor_.view().nodes(first, count), h1, w);
+    }
+}
+
+void KlvFilter::thin(const ObservationWindow& window) {
+  if (!thinning_ || children_.size() <= options_.nodes) {
+    survivors_.states.reshape(children_.states.components(), children_.size());
+    copy_generation(children_, survivors_);
+    return;
+  }
+  const Sites sites{children_.states, children_.log_weight, survivors_.size()};
+  const RandomStream random{options_.seed, options_.launch, static_cast<std::uint32_t>(window.step),
+                            Purpose::thinning};
+  try {
+    thinning_->thin(sites, options_.nodes, random, selection_);
+  } catch (const RunError& e) {
+    throw RunError(
+        e.message(),
+        place(window) + (window.observation.empty()
+                             ? fmt::format(", observation increment {}", fmt::join(window.increment, ", "))
+                             : fmt::format(", observation {}", fmt::join(window.observation, ", "))),
+        e.value());
+  }
+  select(children_, selection_, survivors_);
+  statistics_.discarded += selection_.discarded;
+}
+
+void KlvFilter::normalise() {
+  const Generation& g = *current_;
+  weight_.resize(g.size());
+  double largest = -std::numeric_limits<double>::infinity();
+  for (std::size_t n = 0; n < g.size(); ++n) {
+    weight_[n] = g.log_weight[n] + (g.log_likelihood.empty() ? 0.0 : g.log_likelihood[n]);
+    largest = std::max(largest, weight_[n]);
+  }
+  double sum = 0;
+  for (double& w : weight_) sum += w = std::exp(w - largest);
+  if (!(sum > 0) || !std::isfinite(sum))
+    throw RunError("no node has a positive finite weight",
+                   fmt::format("step {}, t = {:g}", statistics_.steps, time_),
+                   fmt::format("largest log-weight {} of {} nodes", largest, g.size()));
+  for (double& w : weight_) w /= sum;
+  log_evidence_ = largest + std::log(sum);
+  normalised_ = true;
+}
+
+const Posterior& KlvFilter::posterior() {
+  if (!normalised_) normalise();
+  posterior_.time = time_;
+  posterior_.log_evidence = log_evidence_;
+  posterior_.points = current_->states;
+  posterior_.weight = weight_;
+  posterior_.kept = survivors_.size();
+  return posterior_;
+}
+
+}  // namespace wienertree

@@ -1,0 +1,47 @@
+#pragma once
+/// The Kusuoka-Lyons-Victoir filter (Crisan, Ghazali 2007; Crisan, Ortiz-Latorre 2013): a tree of cubature
+/// paths, weighted by the observation and thinned as it grows. Without thinning it is the full tree,
+///     rho^n(phi) = sum_{|b| = n} lambda_b w_0(x_{b[0]}) .. w_{n-1}(x_{b[n-1]}) phi(x_b).
+#include "wienertree/filter/filter.hpp"
+#include "wienertree/tree/growth.hpp"
+
+namespace wienertree {
+
+/// Posteriors are those of the children before they are thinned: thinning serves the next step only, and its
+/// error is not added where it need not be. While the children number at most N they are all kept, with their
+/// exact weights.
+class KlvFilter final : public Filter {
+ public:
+  KlvFilter(const Model& model, const FilterOptions& options);
+  void advance(const ObservationWindow& window) override;
+  const Posterior& posterior() override;
+  std::string_view name() const override;
+  const Generation* generation() const override { return &survivors_; }
+
+ private:
+  void observe_start(const ObservationWindow& window);
+  void grow(const ObservationWindow& window);
+  void weigh(const ObservationWindow& window);
+  void thin(const ObservationWindow& window);
+  void handle_failures(const ObservationWindow& window);
+  std::vector<double>& likelihood_of(Generation& generation) const;
+  void normalise();
+
+  Model model_;
+  FilterOptions options_;
+  std::unique_ptr<Functional> functional_;
+  std::unique_ptr<Thinning> thinning_;
+  TreeGrower grower_;
+  Generation survivors_, children_;
+  const Generation*
+      current_;  ///< what the posterior is made of: children_, or survivors_ where they are the same
+  Selection selection_;
+  Batch sensor_, derivative_, child_sensor_;
+  std::vector<double> start_term_, weight_;
+  std::vector<NodeFailure> failures_;
+  double time_ = 0, log_evidence_ = 0;
+  bool normalised_ = false;
+  Posterior posterior_;
+};
+
+}  // namespace wienertree

@@ -1,0 +1,135 @@
+#include "wienertree/filter/simulate.hpp"
+
+#include <fmt/format.h>
+
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "wienertree/tree/random.hpp"
+
+namespace wienertree {
+namespace {
+
+// Draws one signal step by step, in blocks of normals.
+class SignalPath {
+ public:
+  SignalPath(const Model& model, double dt, RandomStream noise)
+      : model_(model),
+        dt_(dt),
+        noise_(noise),
+        p_(model.noise_dimension()),
+        x_(model.state_dimension(), 1),
+        next_(model.state_dimension(), 1),
+        dB_(p_, 1) {
+    std::copy(model.initial.begin(), model.initial.end(), x_.view().data());
+  }
+
+  void draw_start(const InitialLaw& law, const RandomStream& random) {
+    const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> axes(law.covariance);
+    Eigen::VectorXd z(law.mean.size());
+    random.normals(0, {z.data(), static_cast<std::size_t>(z.size())});
+    const Eigen::VectorXd start =
+        law.mean + axes.eigenvectors() * axes.eigenvalues().cwiseMax(0).cwiseSqrt().cwiseProduct(z);
+    std::copy(start.data(), start.data() + start.size(), x_.view().data());
+  }
+
+  void step(std::size_t number) {
+    if (used_ == normals_.size()) {
+      normals_.resize(p_ * steps_a_block);
+      noise_.normals(drawn_, normals_);
+      drawn_ += normals_.size();
+      used_ = 0;
+    }
+    for (std::size_t j = 0; j < p_; ++j) dB_(j, 0) = std::sqrt(dt_) * normals_[used_++];
+    model_.fields->euler_step(x_, dt_, dB_, next_);
+    for (std::size_t i = 0; i < model_.state_dimension(); ++i) keep_inside(i, number);
+    x_.swap(next_);
+  }
+
+  const Batch& state() const { return x_; }
+
+ private:
+  static constexpr std::size_t steps_a_block = 512;
+
+  void keep_inside(std::size_t i, std::size_t number) {
+    double& x = next_(i, 0);
+    const StateBound& b = model_.bounds[i];
+    if (std::isfinite(x) && x >= b.lower && x <= b.upper) return;
+    if (std::isfinite(x) && b.boundary != Boundary::error) {
+      x = std::clamp(x, b.lower, b.upper);
+      return;
+    }
+    throw RunError(
+        std::isfinite(x) ? "the simulated signal left its bounds" : "the simulated signal is not finite",
+        fmt::format("state {} at t = {:g}", model_.state_names[i], dt_ * static_cast<double>(number)),
+        fmt::format("{}", x));
+  }
+
+  const Model& model_;
+  double dt_;
+  RandomStream noise_;
+  std::size_t p_;
+  Batch x_, next_, dB_;
+  std::vector<double> normals_;
+  std::size_t used_ = 0;
+  std::uint64_t drawn_ = 0;
+};
+
+}  // namespace
+
+Simulation simulate(const Model& model, double horizon, std::size_t steps, std::size_t keep,
+                    std::uint64_t seed, std::uint32_t launch) {
+  if (!(horizon > 0) || !std::isfinite(horizon))
+    throw InputError("must be a positive number", "horizon", fmt::format("{}", horizon));
+  if (steps == 0) throw InputError("must be at least 1", "steps", "0");
+  if (keep == 0 || steps % keep != 0)
+    throw InputError(fmt::format("must divide the number of steps, {}", steps), "keep", std::to_string(keep));
+  const auto stream = [&](Purpose purpose) { return RandomStream{seed, launch, 0, purpose}; };
+  const double dt = horizon / static_cast<double>(steps);
+  const std::size_t every = steps / keep,
+                    k = model.observation == ObservationKind::none ? 0 : model.observation_dimension();
+  SignalPath signal(model, dt, stream(Purpose::signal_noise));
+  if (model.initial_law) signal.draw_start(*model.initial_law, stream(Purpose::initial_state));
+
+  Simulation out;
+  out.signal.dimension = model.reported_dimension();
+  out.observations.dimension = k;
+  std::vector<double> y(k, 0.0), normals(k), uniforms(k), before(model.state_dimension());
+  Batch h(k, 1);
+  const RandomStream noise = stream(Purpose::observation_noise),
+                     uniform = stream(Purpose::observation_uniform);
+  const bool continuous = model.observation == ObservationKind::continuous;
+  const bool previous = model.timing == ObservationTiming::previous;
+  const auto record = [&](std::size_t row) {
+    const double t = horizon * static_cast<double>(row) / static_cast<double>(keep);
+    const std::span<const double> x = {signal.state().view().data(), model.state_dimension()};
+    out.signal.append(t, x.first(out.signal.dimension));
+    if (model.observation == ObservationKind::discrete) {
+      if (previous && row == 0) {
+        std::fill(y.begin(), y.end(), std::numeric_limits<double>::quiet_NaN());
+      } else {
+        noise.normals(row * k, normals);
+        uniform.uniforms(row * k, uniforms);
+        model.density->sample(previous ? std::span<const double>(before) : x, uniforms, normals, y);
+      }
+      std::copy(x.begin(), x.end(), before.begin());
+    }
+    if (k > 0) out.observations.append(t, y);
+  };
+
+  record(0);
+  for (std::size_t m = 1; m <= steps; ++m) {
+    if (continuous) {
+      model.fields->sensor(signal.state(), h);
+      noise.normals((m - 1) * k, normals);
+      for (std::size_t i = 0; i < k; ++i) y[i] += h(i, 0) * dt + std::sqrt(dt) * normals[i];
+    }
+    signal.step(m);
+    if (m % every == 0) record(m / every);
+  }
+  return out;
+}
+
+}  // namespace wienertree

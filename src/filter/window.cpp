@@ -1,0 +1,125 @@
+#include "wienertree/filter/window.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+namespace wienertree {
+namespace {
+
+// Row indices nearest to the uniform grid of n steps, strictly increasing. n <= rows - 1 makes this possible:
+// point j may not go below the point before it plus one, nor above the row that leaves one for each point to
+// come.
+std::vector<std::size_t> grid_rows(const std::vector<double>& t, std::size_t n) {
+  std::vector<std::size_t> rows(n + 1, 0);
+  const double T = t.back() - t.front();
+  for (std::size_t j = 1; j <= n; ++j) {
+    const double target = t.front() + T * static_cast<double>(j) / static_cast<double>(n);
+    auto r = static_cast<std::size_t>(std::lower_bound(t.begin(), t.end(), target) - t.begin());
+    if (r == t.size() || (r > 0 && target - t[r - 1] < t[r] - target)) --r;
+    rows[j] = std::clamp(r, rows[j - 1] + 1, t.size() - 1 - (n - j));
+  }
+  return rows;
+}
+
+}  // namespace
+
+ObservationWindows::ObservationWindows(const ObservationPath& path, ObservationKind kind,
+                                       ObservationTiming timing, std::size_t steps)
+    : path_(&path), kind_(kind) {
+  const std::vector<double>& t = path.times;
+  const std::size_t gaps = path.rows() - 1;
+  if (kind == ObservationKind::continuous) {
+    if (steps > gaps)
+      throw InputError(fmt::format("more steps than the observation has gaps between rows ({})", gaps),
+                       "steps", std::to_string(steps));
+    const auto rows = grid_rows(t, steps == 0 ? gaps : steps);
+    for (std::size_t j = 1; j < rows.size(); ++j)
+      windows_.push_back({t[rows[j - 1]], t[rows[j]], rows[j - 1], rows[j], false, false});
+    return;
+  }
+  if (steps != 0 && steps < gaps)
+    throw InputError(fmt::format("fewer steps than gaps between discrete observations ({})", gaps), "steps",
+                     std::to_string(steps));
+  const bool previous = timing == ObservationTiming::previous;
+  const auto present = [&](std::size_t r) {
+    return std::any_of(path.row(r).begin(), path.row(r).end(), [](double y) { return !std::isnan(y); });
+  };
+  if (present(0)) {
+    if (previous)
+      throw InputError(
+          "with timing = \"previous\" the first row has no earlier state to observe: leave its values empty",
+          "observations: row 1");
+    windows_.push_back({t[0], t[0], 0, 0, true, false});
+  }
+  const double longest = steps == 0 ? INFINITY : (t.back() - t.front()) / static_cast<double>(steps);
+  for (std::size_t r = 1; r < path.rows(); ++r) {
+    const double gap = t[r] - t[r - 1];
+    // 1e-9 relative: a gap of exactly `longest` up to rounding is one step.
+    const auto parts = static_cast<std::size_t>(std::max(1.0, std::ceil(gap / longest * (1 - 1e-9))));
+    for (std::size_t i = 1; i <= parts; ++i) {
+      const auto at = [&](std::size_t part) {
+        return part == parts ? t[r] : t[r - 1] + gap * static_cast<double>(part) / static_cast<double>(parts);
+      };
+      windows_.push_back({at(i - 1), at(i), r, r, present(r) && (previous ? i == 1 : i == parts), previous});
+    }
+  }
+}
+
+void ObservationWindows::get(std::size_t j, ObservationWindow& out) const {
+  const Bounds& w = windows_[j];
+  out.step = j + 1;
+  out.start = w.start;
+  out.end = w.end;
+  if (kind_ == ObservationKind::continuous) {
+    const std::size_t rows = w.last_row - w.first_row + 1, k = path_->dimension;
+    out.row_times = {path_->times.data() + w.first_row, rows};
+    out.row_values = {path_->values.data() + w.first_row * k, rows * k};
+    integrate_rows(out, k);
+  } else {
+    out.at_start = w.at_start;
+    out.observation.clear();
+    if (w.observed) out.observation.assign(path_->row(w.last_row).begin(), path_->row(w.last_row).end());
+  }
+}
+
+void integrate_rows(ObservationWindow& window, std::size_t k) {
+  const std::size_t rows = window.rows();
+  const double s = window.length();
+  const double* last = window.row_values.data() + (rows - 1) * k;
+  window.increment.resize(k);
+  window.integral.assign(k, 0.0);
+  window.covariation.assign(k * k, 0.0);
+  for (std::size_t i = 0; i < k; ++i) window.increment[i] = last[i] - window.row_values[i];
+  if (rows == 2) {
+    for (std::size_t i = 0; i < k; ++i) {
+      window.integral[i] = s * window.increment[i] / 2;
+      window.covariation[i * k + i] = s * s / 6;
+    }
+    return;
+  }
+  double bridge = 0;  // diagonal part: sum delta^2/6 - sum delta^3/(12 s)
+  for (std::size_t r = 0; r + 1 < rows; ++r) {
+    const double delta = window.row_times[r + 1] - window.row_times[r];
+    const double* a = window.row_values.data() + r * k;
+    const double* b = a + k;
+    bridge += delta * delta / 6 - delta * delta * delta / (12 * s);
+    for (std::size_t i = 0; i < k; ++i) {
+      const double ui = last[i] - a[i], vi = last[i] - b[i];
+      window.integral[i] += delta * (ui + vi) / 2;
+      for (std::size_t l = 0; l <= i; ++l) {
+        const double ul = last[l] - a[l], vl = last[l] - b[l];
+        window.covariation[i * k + l] += delta * (ui * ul / 3 + (ui * vl + vi * ul) / 6 + vi * vl / 3);
+      }
+    }
+  }
+  for (std::size_t i = 0; i < k; ++i)
+    for (std::size_t l = 0; l <= i; ++l) {
+      double& c = window.covariation[i * k + l];
+      c += (i == l ? bridge : 0.0) - window.integral[i] * window.integral[l] / s;
+      window.covariation[l * k + i] = c;
+    }
+}
+
+}  // namespace wienertree

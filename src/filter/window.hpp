@@ -1,0 +1,70 @@
+#pragma once
+/// What a filter consumes: the observation over one step.
+#include <cstddef>
+#include <span>
+#include <vector>
+
+#include "wienertree/filter/observations.hpp"
+
+namespace wienertree {
+
+/// The observation over [start, end]. With U_u = Y_end - Y_u:
+///     increment  D = Y_end - Y_start                                  (k)
+///     integral   I = int_start^end U_u du                             (k)
+///     covariation C = int U_u U_u^T du - I I^T / s,  s = end - start   (k x k, row-major)
+/// I and C are conditional expectations given the rows: Y between two rows is a Brownian bridge, whose
+/// variance adds delta^2/6 Id to int U U^T and delta^3/12 Id to the covariance of I for each gap delta.
+/// Without a row strictly inside, I = sD/2 and C = (s^2/6) Id (its unconditional mean), which turns the
+/// second-order functional into the trapezoid.
+struct ObservationWindow {
+  std::size_t step = 0;  ///< number of the step, from 1
+  double start = 0, end = 0;
+
+  std::span<const double> row_times;   ///< continuous: rows of [start, end], first and last included
+  std::span<const double> row_values;  ///< their values, rows x k
+  std::vector<double> increment, integral, covariation;
+
+  /// Discrete: the observation to weigh by, or empty. `at_start`: it is a function of the state at `start`
+  /// (timing "previous"), else of the state at `end`. A window of length zero weighs without moving.
+  std::vector<double> observation;
+  bool at_start = false;
+
+  double length() const { return end - start; }
+  std::size_t rows() const { return row_times.size(); }
+};
+
+/// Cuts an observation record into windows.
+///
+/// Continuous: the grid's points are moved to the nearest row, since Y is known only there. Discrete: every
+/// row ends a window; the gap before it is divided into as many equal steps as keep each at most as long as
+/// the grid asks for.
+class ObservationWindows {
+ public:
+  /// @param steps number of steps n; 0 means one for every row. Windows refer to `path`, which must outlive
+  /// them.
+  /// @throws InputError if steps exceeds the number of gaps between rows (continuous), or is smaller than it
+  /// (discrete), or a first row is given where timing "previous" has no earlier state
+  ObservationWindows(const ObservationPath& path, ObservationKind kind, ObservationTiming timing,
+                     std::size_t steps);
+  std::size_t size() const { return windows_.size(); }
+  /// Window j = 0..size()-1; buffers of `out` are reused.
+  void get(std::size_t j, ObservationWindow& out) const;
+  double start() const { return path_->times.front(); }
+  double end() const { return path_->times.back(); }
+  double time(std::size_t j) const { return windows_[j].end; }
+
+ private:
+  struct Bounds {
+    double start, end;
+    std::size_t first_row, last_row;  ///< continuous: rows inside; discrete: last_row is the row observed
+    bool observed, at_start;
+  };
+  const ObservationPath* path_;
+  ObservationKind kind_;
+  std::vector<Bounds> windows_;
+};
+
+/// Fills increment, integral and covariation of a continuous window from its rows.
+void integrate_rows(ObservationWindow& window, std::size_t dimension);
+
+}  // namespace wienertree

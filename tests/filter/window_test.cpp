@@ -1,0 +1,128 @@
+#include "wienertree/filter/window.hpp"
+
+#include <catch2/catch.hpp>
+#include <cmath>
+
+#include "wienertree/tree/random.hpp"
+
+using namespace wienertree;
+
+namespace {
+
+ObservationPath path_of(const std::vector<double>& t, const std::vector<double>& y) {
+  ObservationPath p;
+  p.dimension = y.size() / t.size();
+  p.times = t;
+  p.values = y;
+  return p;
+}
+
+ObservationWindow only_window(const ObservationPath& path) {
+  ObservationWindow w;
+  ObservationWindows(path, ObservationKind::continuous, ObservationTiming::current, 1).get(0, w);
+  return w;
+}
+
+}  // namespace
+
+TEST_CASE("increments alone give the unconditional integral and covariation") {
+  const auto path = path_of({1.0, 1.5}, {2.0, 0.0, 3.0, -1.0});
+  const auto w = only_window(path);
+  CHECK(w.increment == std::vector{1.0, -1.0});
+  CHECK(w.integral[0] == Approx(0.25));
+  CHECK(w.covariation[0] == Approx(0.25 / 6));
+  CHECK(w.covariation[1] == 0.0);
+}
+
+TEST_CASE("on many rows integral and covariation converge to their definition") {
+  // Y_u = (u, u^2) on [0, 1]: U = (1 - u, 1 - u^2); I = (1/2, 2/3); int U U^T = (1/3, 5/12; 5/12, 8/15).
+  constexpr std::size_t rows = 2001;
+  std::vector<double> t, y;
+  for (std::size_t r = 0; r < rows; ++r) {
+    t.push_back(static_cast<double>(r) / (rows - 1));
+    y.push_back(t.back());
+    y.push_back(t.back() * t.back());
+  }
+  const auto path = path_of(t, y);
+  const auto w = only_window(path);
+  // The bridge part is sum delta^2/6 = 1/(6*2000) = 8.4e-5, the quadrature error O(delta^2) = 1e-7.
+  const double bridge = 1.0 / 12000;
+  CHECK(w.integral[0] == Approx(0.5).margin(1e-6));
+  CHECK(w.integral[1] == Approx(2.0 / 3).margin(1e-6));
+  CHECK(w.covariation[0] == Approx(1.0 / 3 - 1.0 / 4 + bridge).margin(1e-6));
+  CHECK(w.covariation[1] == Approx(5.0 / 12 - 1.0 / 3).margin(1e-6));
+  CHECK(w.covariation[2] == w.covariation[1]);
+  CHECK(w.covariation[3] == Approx(8.0 / 15 - 4.0 / 9 + bridge).margin(1e-6));
+}
+
+TEST_CASE("coarse rows give the conditional expectation of what fine rows give") {
+  // Null hypothesis: E[I_fine - I_coarse] = 0 and E[C_fine - C_coarse] = 0 for Brownian Y, with 3 coarse rows
+  // of 64 fine ones. 20000 draws; z threshold 5.5: two-sided false-alarm rate 4e-8 a test, 2 tests.
+  constexpr std::size_t fine = 64, draws = 20000;
+  double sum[2] = {}, squares[2] = {};
+  std::vector<double> t(fine + 1), z(fine);
+  for (std::size_t r = 0; r <= fine; ++r) t[r] = static_cast<double>(r) / fine;
+  for (std::size_t draw = 0; draw < draws; ++draw) {
+    RandomStream{7, 0, static_cast<std::uint32_t>(draw), Purpose::observation_noise}.normals(0, z);
+    std::vector<double> y(fine + 1, 0.0);
+    for (std::size_t r = 0; r < fine; ++r) y[r + 1] = y[r] + z[r] / 8;  // sqrt(1/64)
+    const auto a = path_of(t, y), b = path_of({t[0], t[16], t[64]}, {y[0], y[16], y[64]});
+    const auto wf = only_window(a), wc = only_window(b);
+    const double difference[2] = {wf.integral[0] - wc.integral[0], wf.covariation[0] - wc.covariation[0]};
+    for (int i = 0; i < 2; ++i) {
+      sum[i] += difference[i];
+      squares[i] += difference[i] * difference[i];
+    }
+  }
+  for (int i = 0; i < 2; ++i) CHECK(std::abs(sum[i]) < 5.5 * std::sqrt(squares[i]));
+}
+
+TEST_CASE("grid points move to the nearest rows and never coincide") {
+  const auto path = path_of({0, 0.1, 0.2, 0.9, 1.0}, {0, 1, 2, 3, 4});
+  ObservationWindows windows(path, ObservationKind::continuous, ObservationTiming::current, 3);
+  REQUIRE(windows.size() == 3);
+  CHECK(windows.time(0) == 0.2);
+  CHECK(windows.time(1) == 0.9);
+  CHECK(windows.time(2) == 1.0);
+  ObservationWindow w;
+  windows.get(0, w);
+  CHECK(w.rows() == 3);
+  CHECK(w.increment[0] == 2.0);
+  CHECK(ObservationWindows(path, ObservationKind::continuous, ObservationTiming::current, 0).size() == 4);
+  CHECK_THROWS_AS(ObservationWindows(path, ObservationKind::continuous, ObservationTiming::current, 5),
+                  InputError);
+}
+
+TEST_CASE("discrete observations divide their gaps and weigh where they were made") {
+  const double nan = std::nan("");
+  const auto path = path_of({0, 1, 3}, {nan, 1, 2});
+  ObservationWindow w;
+  SECTION("current: at the end of the last part") {
+    ObservationWindows windows(path, ObservationKind::discrete, ObservationTiming::current, 3);
+    REQUIRE(windows.size() == 3);
+    windows.get(0, w);
+    CHECK((w.observation == std::vector{1.0} && !w.at_start && w.end == 1));
+    windows.get(1, w);
+    CHECK((w.observation.empty() && w.end == 2));
+    windows.get(2, w);
+    CHECK((w.observation == std::vector{2.0} && w.start == 2 && w.end == 3));
+  }
+  SECTION("previous: at the start of the first part") {
+    ObservationWindows windows(path, ObservationKind::discrete, ObservationTiming::previous, 3);
+    windows.get(1, w);
+    CHECK((w.observation == std::vector{2.0} && w.at_start && w.start == 1));
+    windows.get(2, w);
+    CHECK(w.observation.empty());
+  }
+  SECTION("an observation at the start is a window of length zero") {
+    const auto observed = path_of({0, 1}, {5, 6});
+    ObservationWindows windows(observed, ObservationKind::discrete, ObservationTiming::current, 0);
+    REQUIRE(windows.size() == 2);
+    windows.get(0, w);
+    CHECK((w.length() == 0 && w.observation == std::vector{5.0}));
+    CHECK_THROWS_AS(ObservationWindows(observed, ObservationKind::discrete, ObservationTiming::previous, 0),
+                    InputError);
+    CHECK_THROWS_AS(ObservationWindows(path, ObservationKind::discrete, ObservationTiming::current, 1),
+                    InputError);
+  }
+}
