@@ -5,21 +5,35 @@
 #include <cmath>
 
 #include "wienertree/filter/benes_filter.hpp"
+#include "wienertree/filter/euler_filter.hpp"
 #include "wienertree/filter/klv_filter.hpp"
 
 namespace wienertree {
 namespace {
 
+void check_node_options(const FilterOptions& options) {
+  if (options.nodes == 0) throw InputError("must be at least 1", "nodes", "0");
+  if (options.threads == 0) throw InputError("must be at least 1", "threads", "0");
+}
+
 void check_tree_options(const Model& model, const FilterOptions& options) {
+  check_node_options(options);
   if (options.formula.paths.empty() || options.formula.dimension != static_cast<int>(model.noise_dimension()))
     throw InputError(
         fmt::format("the model has {} Brownian motion{}, the cubature formula {}", model.noise_dimension(),
                     model.noise_dimension() == 1 ? "" : "s", options.formula.dimension),
         "formula " + options.formula.name);
-  if (options.nodes == 0) throw InputError("must be at least 1", "nodes", "0");
-  if (options.threads == 0) throw InputError("must be at least 1", "threads", "0");
   if (!(options.memory_limit > 0))
     throw InputError("must be positive", "memory limit", fmt::format("{}", options.memory_limit));
+}
+
+void check_particle_options(const FilterOptions& options) {
+  check_node_options(options);
+  if (!(options.ess_threshold >= 0 && options.ess_threshold <= 1))
+    throw InputError("must lie between 0 and 1", "ess-threshold", fmt::format("{}", options.ess_threshold));
+  if (options.thinning.method == ThinningMethod::recombination)
+    throw InputError("the Euler filter needs a thinning that counts particles; recombination keeps weights",
+                     "thin", "recombination");
 }
 
 }  // namespace
@@ -32,6 +46,9 @@ std::unique_ptr<Filter> make_filter(const Model& model, const FilterOptions& opt
     case FilterMethod::klv:
       check_tree_options(model, options);
       return std::make_unique<KlvFilter>(model, options);
+    case FilterMethod::euler:
+      check_particle_options(options);
+      return std::make_unique<EulerFilter>(model, options);
     case FilterMethod::full_tree: {
       check_tree_options(model, options);
       FilterOptions unpruned = options;

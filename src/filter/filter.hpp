@@ -10,6 +10,7 @@
 #include "wienertree/cubature/formula.hpp"
 #include "wienertree/filter/functional.hpp"
 #include "wienertree/filter/posterior.hpp"
+#include "wienertree/filter/weights.hpp"
 #include "wienertree/filter/window.hpp"
 #include "wienertree/model/model.hpp"
 #include "wienertree/tree/generation.hpp"
@@ -45,7 +46,7 @@ class Filter {
   FilterStatistics statistics_;
 };
 
-enum class FilterMethod { klv, full_tree, benes };
+enum class FilterMethod { klv, full_tree, euler, benes };
 
 /// Which weights decide where the particles go (Crisan, Ortiz-Latorre 2013, versions 1 and 2).
 enum class PruneWeights {
@@ -62,6 +63,8 @@ struct FilterOptions {
   ThinningOptions thinning;
   PruneWeights prune_weights = PruneWeights::likelihood;
   FunctionalMethod functional = FunctionalMethod::second_order;
+  double ess_threshold =
+      1.0;  ///< Euler: resample when the effective sample size is at most this fraction of N
   FlowMethod flow = FlowMethod::automatic;
   FlowTolerance tolerance;
   OnNodeFailure on_node_failure = OnNodeFailure::stop;

@@ -39,6 +39,20 @@ StandardLaw cubature_points(Eigen::Index r) {
   return {rule.points, rule.weights.array().log().matrix()};
 }
 
+// Columns L with L L^T = covariance, as many as its rank.
+Eigen::MatrixXd covariance_root(const Model& model) {
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> axes(model.initial_law->covariance);
+  const Eigen::VectorXd& variance = axes.eigenvalues();
+  // An eigenvalue of a symmetric matrix is computed to about d eps times the largest one.
+  const double negligible = 1e-14 * static_cast<double>(variance.size()) * std::max(0.0, variance.maxCoeff());
+  if (variance.minCoeff() < -negligible)
+    throw InputError("the covariance of the initial law is not positive semidefinite", "model " + model.name,
+                     fmt::format("eigenvalue {}", variance.minCoeff()));
+  const Eigen::Index r =
+      (variance.array() > negligible).count();  // eigenvalues ascend: the last r span the law
+  return axes.eigenvectors().rightCols(r) * variance.tail(r).cwiseSqrt().asDiagonal();
+}
+
 }  // namespace
 
 Generation first_generation(const Model& model, std::size_t nodes) {
@@ -51,19 +65,8 @@ Generation first_generation(const Model& model, std::size_t nodes) {
     return g;
   }
   const InitialLaw& law = *model.initial_law;
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> axes(law.covariance);
-  const Eigen::VectorXd& variance = axes.eigenvalues();
-  const double largest = std::max(0.0, variance.maxCoeff());
-  // An eigenvalue of a symmetric matrix is computed to about d eps times the largest one.
-  const double negligible = 1e-14 * static_cast<double>(d) * largest;
-  if (variance.minCoeff() < -negligible)
-    throw InputError("the covariance of the initial law is not positive semidefinite", "model " + model.name,
-                     fmt::format("eigenvalue {}", variance.minCoeff()));
-  const Eigen::Index r = (variance.array() > negligible).count();
-  Eigen::MatrixXd root(variance.size(), r);  // eigenvalues ascend: the last r columns span the law
-  for (Eigen::Index i = 0; i < r; ++i)
-    root.col(i) =
-        axes.eigenvectors().col(variance.size() - r + i) * std::sqrt(variance(variance.size() - r + i));
+  const Eigen::MatrixXd root = covariance_root(model);
+  const Eigen::Index r = root.cols();
   StandardLaw standard;
   if (r == 0) {
     standard = {Eigen::MatrixXd(0, 1), Eigen::VectorXd::Zero(1)};
@@ -79,6 +82,22 @@ Generation first_generation(const Model& model, std::size_t nodes) {
       g.states(i, n) = points(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(n));
   g.log_weight.assign(standard.log_weight.data(), standard.log_weight.data() + standard.log_weight.size());
   return g;
+}
+
+void draw_initial(const Model& model, const RandomStream& random, std::size_t nodes, Batch& x) {
+  const std::size_t d = model.state_dimension();
+  x.reshape(d, nodes);
+  if (!model.initial_law) {
+    for (std::size_t i = 0; i < d; ++i) std::fill_n(x.component(i).begin(), nodes, model.initial[i]);
+    return;
+  }
+  const Eigen::MatrixXd root = covariance_root(model);
+  Eigen::VectorXd z(root.cols());
+  for (std::size_t n = 0; n < nodes; ++n) {
+    random.normals(n * static_cast<std::size_t>(z.size()), {z.data(), static_cast<std::size_t>(z.size())});
+    const Eigen::VectorXd start = model.initial_law->mean + root * z;
+    for (std::size_t i = 0; i < d; ++i) x(i, n) = start(static_cast<Eigen::Index>(i));
+  }
 }
 
 }  // namespace wienertree

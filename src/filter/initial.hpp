@@ -2,6 +2,7 @@
 /// The first generation of a tree.
 #include "wienertree/model/model.hpp"
 #include "wienertree/tree/generation.hpp"
+#include "wienertree/tree/random.hpp"
 
 namespace wienertree {
 
@@ -12,5 +13,8 @@ namespace wienertree {
 /// takes its place.
 /// @param nodes N >= 1   @throws InputError if the covariance is not positive semidefinite
 Generation first_generation(const Model& model, std::size_t nodes);
+
+/// N independent draws of the start.   x is reshaped to d x N.   @throws InputError as above
+void draw_initial(const Model& model, const RandomStream& random, std::size_t nodes, Batch& x);
 
 }  // namespace wienertree

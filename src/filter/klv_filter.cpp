@@ -1,20 +1,16 @@
 #include "wienertree/filter/klv_filter.hpp"
 
 #include <fmt/format.h>
-#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <cmath>
 #include <limits>
 
 #include "wienertree/filter/initial.hpp"
+#include "wienertree/filter/places.hpp"
 
 namespace wienertree {
 namespace {
-
-std::string place(const ObservationWindow& window) {
-  return fmt::format("step {}, t = {:g}", window.step, window.end);
-}
 
 std::string_view reason(FailureReason r) {
   switch (r) {
@@ -58,7 +54,7 @@ void KlvFilter::advance(const ObservationWindow& window) {
   }
   ++statistics_.steps;
   time_ = window.end;
-  normalised_ = false;
+  stale_ = true;
 }
 
 // Whatever depends on the nodes at the window's start: an observation there, and the functional's first term.
@@ -114,9 +110,9 @@ void KlvFilter::weigh(const ObservationWindow& window) {
   std::vector<double>& weight = likelihood_of(children_);
   if (model_.observation == ObservationKind::discrete) {
     if (window.at_start || window.observation.empty()) return;
-    weight_.resize(children_.size());
-    model_.density->log_density(window.observation, children_.states, weight_);
-    for (std::size_t n = 0; n < children_.size(); ++n) weight[n] += weight_[n];
+    term_.resize(children_.size());
+    model_.density->log_density(window.observation, children_.states, term_);
+    for (std::size_t n = 0; n < children_.size(); ++n) weight[n] += term_[n];
     return;
   }
   if (model_.observation == ObservationKind::none) return;
@@ -157,31 +153,14 @@ void KlvFilter::thin(const ObservationWindow& window) {
   statistics_.discarded += selection_.discarded;
 }
 
-void KlvFilter::normalise() {
-  const Generation& g = *current_;
-  weight_.resize(g.size());
-  double largest = -std::numeric_limits<double>::infinity();
-  for (std::size_t n = 0; n < g.size(); ++n) {
-    weight_[n] = g.log_weight[n] + (g.log_likelihood.empty() ? 0.0 : g.log_likelihood[n]);
-    largest = std::max(largest, weight_[n]);
-  }
-  double sum = 0;
-  for (double& w : weight_) sum += w = std::exp(w - largest);
-  if (!(sum > 0) || !std::isfinite(sum))
-    throw RunError("no node has a positive finite weight",
-                   fmt::format("step {}, t = {:g}", statistics_.steps, time_),
-                   fmt::format("largest log-weight {} of {} nodes", largest, g.size()));
-  for (double& w : weight_) w /= sum;
-  log_evidence_ = largest + std::log(sum);
-  normalised_ = true;
-}
-
 const Posterior& KlvFilter::posterior() {
-  if (!normalised_) normalise();
+  if (stale_)
+    normalised_.assign(current_->log_weight, current_->log_likelihood, fmt::format("t = {:g}", time_));
+  stale_ = false;
   posterior_.time = time_;
-  posterior_.log_evidence = log_evidence_;
+  posterior_.log_evidence = normalised_.log_mass;
   posterior_.points = current_->states;
-  posterior_.weight = weight_;
+  posterior_.weight = normalised_.weight;
   posterior_.kept = survivors_.size();
   return posterior_;
 }

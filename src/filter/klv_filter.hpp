@@ -25,7 +25,6 @@ class KlvFilter final : public Filter {
   void thin(const ObservationWindow& window);
   void handle_failures(const ObservationWindow& window);
   std::vector<double>& likelihood_of(Generation& generation) const;
-  void normalise();
 
   Model model_;
   FilterOptions options_;
@@ -37,10 +36,11 @@ class KlvFilter final : public Filter {
       current_;  ///< what the posterior is made of: children_, or survivors_ where they are the same
   Selection selection_;
   Batch sensor_, derivative_, child_sensor_;
-  std::vector<double> start_term_, weight_;
+  std::vector<double> start_term_, term_;
   std::vector<NodeFailure> failures_;
-  double time_ = 0, log_evidence_ = 0;
-  bool normalised_ = false;
+  double time_ = 0;
+  NormalisedWeights normalised_;
+  bool stale_ = true;
   Posterior posterior_;
 };
 

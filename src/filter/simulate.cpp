@@ -2,11 +2,11 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <limits>
 
+#include "wienertree/filter/initial.hpp"
 #include "wienertree/tree/random.hpp"
 
 namespace wienertree {
@@ -15,7 +15,7 @@ namespace {
 // Draws one signal step by step, in blocks of normals.
 class SignalPath {
  public:
-  SignalPath(const Model& model, double dt, RandomStream noise)
+  SignalPath(const Model& model, double dt, RandomStream start, RandomStream noise)
       : model_(model),
         dt_(dt),
         noise_(noise),
@@ -23,16 +23,7 @@ class SignalPath {
         x_(model.state_dimension(), 1),
         next_(model.state_dimension(), 1),
         dB_(p_, 1) {
-    std::copy(model.initial.begin(), model.initial.end(), x_.view().data());
-  }
-
-  void draw_start(const InitialLaw& law, const RandomStream& random) {
-    const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> axes(law.covariance);
-    Eigen::VectorXd z(law.mean.size());
-    random.normals(0, {z.data(), static_cast<std::size_t>(z.size())});
-    const Eigen::VectorXd start =
-        law.mean + axes.eigenvectors() * axes.eigenvalues().cwiseMax(0).cwiseSqrt().cwiseProduct(z);
-    std::copy(start.data(), start.data() + start.size(), x_.view().data());
+    draw_initial(model, start, 1, x_);
   }
 
   void step(std::size_t number) {
@@ -90,8 +81,7 @@ Simulation simulate(const Model& model, double horizon, std::size_t steps, std::
   const double dt = horizon / static_cast<double>(steps);
   const std::size_t every = steps / keep,
                     k = model.observation == ObservationKind::none ? 0 : model.observation_dimension();
-  SignalPath signal(model, dt, stream(Purpose::signal_noise));
-  if (model.initial_law) signal.draw_start(*model.initial_law, stream(Purpose::initial_state));
+  SignalPath signal(model, dt, stream(Purpose::initial_state), stream(Purpose::signal_noise));
 
   Simulation out;
   out.signal.dimension = model.reported_dimension();
