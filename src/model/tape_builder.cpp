@@ -3,6 +3,7 @@
 #include <bit>
 #include <cassert>
 #include <cmath>
+#include <tuple>
 #include <utility>
 
 #include "wienertree/model/tape.hpp"
@@ -99,19 +100,19 @@ TapeBuilder::Value TapeBuilder::difference(Value a, Value b) {
 }
 
 TapeBuilder::Value TapeBuilder::product(Value a, Value b) {
-  if (at(a).shared) std::swap(a, b);  // a shared factor stands second, a constant last of all
-  if (is_constant(a)) std::swap(a, b);
+  // A shared factor stands second, a constant more so; the rest in the order in which they were made, latest first.
+  const auto rank = [&](Value v) { return std::tuple(is_constant(v), at(v).shared, nodes_.size() - v); };
+  if (rank(a) > rank(b)) std::swap(a, b);
   if (is_constant(b, 0.0)) return b;
   if (is_constant(b, 1.0)) return a;
   if (is_constant(b, -1.0)) return negative(a);
   if (is_operation(a, Op::negate))
     return is_constant(b) ? product(at(a).a, constant(-at(b).value)) : negative(product(at(a).a, b));
   if (is_operation(b, Op::negate)) return negative(product(a, at(b).a));
-  if (at(b).shared && is_operation(a, Op::multiply) && at(at(a).b).shared) {
+  if (at(b).shared && !at(a).shared && is_operation(a, Op::multiply) && at(at(a).b).shared) {
     const Value collected = product(at(a).b, b);  // (x s) t = x (s t)
     if (!is_constant(collected) || std::isnormal(at(collected).value)) return product(at(a).a, collected);
   }
-  if (at(a).shared == at(b).shared && !is_constant(b) && a < b) std::swap(a, b);
   return operation(Op::multiply, a, b);
 }
 
