@@ -13,14 +13,13 @@ namespace wienertree {
 inline constexpr size_t tape_block = 64;
 
 /// Instructions of the tape. A suffix names the operands: v a slot with a value per node, s a scalar.
+// clang-format off
 #define WIENERTREE_TAPE_BINARY(X) X(add) X(subtract) X(multiply) X(divide) X(power) X(minimum) X(maximum)
 #define WIENERTREE_TAPE_FUSED(X) X(multiply_add) X(multiply_subtract) X(negative_multiply_add)
-#define WIENERTREE_TAPE_UNARY(X)                                                                             \
-  X(negate)                                                                                                  \
-  X(absolute)                                                                                                \
-  X(sign) X(step) X(square_root) X(exponential) X(logarithm) X(sine) X(cosine) X(tangent) X(hyperbolic_sine) \
-      X(hyperbolic_cosine) X(hyperbolic_tangent) X(arctangent) X(error_function)                             \
-          X(error_function_complement)
+#define WIENERTREE_TAPE_UNARY(X) \
+  X(negate) X(absolute) X(sign) X(step) X(square_root) X(exponential) X(logarithm) X(sine) X(cosine) X(tangent) \
+  X(hyperbolic_sine) X(hyperbolic_cosine) X(hyperbolic_tangent) X(arctangent) X(error_function) \
+  X(error_function_complement)
 
 enum class TapeCode : uint8_t {
   copy_v,
@@ -29,12 +28,13 @@ enum class TapeCode : uint8_t {
   WIENERTREE_TAPE_BINARY(X)
 #undef X
 #define X(name) name##_vvv, name##_vvs, name##_vsv, name##_vss,
-      WIENERTREE_TAPE_FUSED(X)  // a b + c,  a b - c,  c - a b
+  WIENERTREE_TAPE_FUSED(X)  // a b + c,  a b - c,  c - a b
 #undef X
 #define X(name) name##_v,
   WIENERTREE_TAPE_UNARY(X)
 #undef X
 };
+// clang-format on
 
 /// slot[target] = code(a, b, c); an operand is the index of a slot or of a scalar, as the code's suffix says.
 struct TapeInstruction {
