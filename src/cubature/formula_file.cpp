@@ -130,9 +130,15 @@ CubatureFormula parse_formula(const std::string& json, const std::string& where)
 }
 
 CubatureFormula read_formula(const std::filesystem::path& file) {
-  std::ifstream stream(file, std::ios::binary);
-  const std::string json{std::istreambuf_iterator<char>(stream), std::istreambuf_iterator<char>()};
-  if (!stream) throw InputError("the formula file cannot be read", file.string());
+  std::string json;
+  try {
+    std::ifstream stream;
+    stream.exceptions(std::ios::failbit | std::ios::badbit);
+    stream.open(file, std::ios::binary);
+    json.assign(std::istreambuf_iterator<char>(stream), std::istreambuf_iterator<char>());
+  } catch (const std::ios::failure&) {  // thrown by the buffer itself where the file is a directory
+    throw InputError("the formula file cannot be read", file.string());
+  }
   return parse_formula(json, file.string());
 }
 
