@@ -1,71 +1,92 @@
 #include "wienertree/tree/random.hpp"
 
-#include <Random123/philox.h>
-
+#include <algorithm>
+#include <array>
+#include <bit>
 #include <cmath>
-#include <numbers>
+
+#include "wienertree/tree/clones.hpp"
+#include "wienertree/tree/elementary.hpp"
+#include "wienertree/tree/philox.hpp"
 
 namespace wienertree {
 namespace {
 
-struct UniformPair {
-  double first, second;
-};
+constexpr std::size_t block = 2 * philox_block;  ///< draws a block: two a counter
 
-// Counter (index, step, launch with the purpose in its high byte): 2^32 x 2 indices per block number would
-// wrap at 2^33 draws a stream, so the pair number takes 64 bits of the counter.
-UniformPair uniform_pair(const RandomStream& s, std::uint64_t pair) {
-  using Generator = r123::Philox4x32;
-  const Generator::ctr_type counter = {
-      {static_cast<std::uint32_t>(pair),
-       static_cast<std::uint32_t>(pair >> 32) ^ (static_cast<std::uint32_t>(s.purpose) << 16), s.step,
-       s.launch}};
-  const Generator::key_type key = {
-      {static_cast<std::uint32_t>(s.seed), static_cast<std::uint32_t>(s.seed >> 32)}};
-  const Generator::ctr_type r = Generator()(counter, key);
-  const auto to_unit = [](std::uint32_t high, std::uint32_t low) {
-    const std::uint64_t bits = (static_cast<std::uint64_t>(high) << 32 | low) >> 11;
-    return (static_cast<double>(bits) + 0.5) * 0x1.0p-53;
-  };
-  return {to_unit(r[0], r[1]), to_unit(r[2], r[3])};
+PhiloxStream philox_stream(const RandomStream& s) {
+  return {{static_cast<std::uint32_t>(s.seed), static_cast<std::uint32_t>(s.seed >> 32)},
+          static_cast<std::uint32_t>(s.purpose) << 16,
+          s.step,
+          s.launch};
 }
 
-struct NormalPair {
-  double first, second;
-};
-
-NormalPair normal_pair(const RandomStream& s, std::uint64_t pair) {
-  const auto [u, v] = uniform_pair(s, pair);
-  const double radius = std::sqrt(-2.0 * std::log(u));
-  const double angle = 2.0 * std::numbers::pi * v;
-  return {radius * std::cos(angle), radius * std::sin(angle)};
+// (k + 1/2) 2^-52 with k the upper 52 bits: the difference is exact.
+inline double to_unit(std::uint64_t bits) {
+  return std::bit_cast<double>(bits >> 12 | 0x3ff0000000000000) - (1.0 - 0x1.0p-53);
 }
 
-template <class Pair>
-void fill(std::uint64_t first, std::span<double> out, Pair pair_of) {
-  std::size_t i = 0;
-  if (!out.empty() && first % 2 == 1) out[i++] = pair_of(first / 2).second;
-  for (; i + 1 < out.size(); i += 2) {
-    const auto p = pair_of((first + i) / 2);
-    out[i] = p.first;
-    out[i + 1] = p.second;
+WIENERTREE_CLONES void uniform_block(const PhiloxBlock& r, double* out) {
+  for (std::size_t c = 0; c < philox_block; ++c) {
+    out[2 * c] = to_unit(r.low[c]);
+    out[2 * c + 1] = to_unit(r.high[c]);
   }
-  if (i < out.size()) out[i] = pair_of((first + i) / 2).first;
+}
+
+WIENERTREE_CLONES void normal_block(const PhiloxBlock& r, double* out) {
+  for (std::size_t c = 0; c < philox_block; ++c) {
+    const double radius = std::sqrt(-2.0 * elementary::log_near_unit(to_unit(r.low[c])));
+    const auto [sine, cosine] = elementary::sine_cosine_of_turn(to_unit(r.high[c]));
+    out[2 * c] = radius * cosine;
+    out[2 * c + 1] = radius * sine;
+  }
+}
+
+WIENERTREE_CLONES void exponential_block(const PhiloxBlock& r, double* out) {
+  for (std::size_t c = 0; c < philox_block; ++c) {
+    out[2 * c] = -elementary::log_near_unit(to_unit(r.low[c]));
+    out[2 * c + 1] = -elementary::log_near_unit(to_unit(r.high[c]));
+  }
+}
+
+// Whole blocks go straight to `out`; the ragged ends pass through a buffer.
+template <class BlockOf>
+void fill(const RandomStream& stream, std::uint64_t first, std::span<double> out, BlockOf block_of) {
+  const PhiloxStream key = philox_stream(stream);
+  PhiloxBlock bits;
+  std::array<double, block> buffer;
+  for (std::size_t done = 0; done < out.size();) {
+    const std::uint64_t index = first + done;
+    const std::size_t skip = index % 2;
+    philox(key, index / 2, bits);
+    if (skip == 0 && out.size() - done >= block) {
+      block_of(bits, out.data() + done);
+      done += block;
+    } else {
+      const std::size_t take = std::min(block - skip, out.size() - done);
+      block_of(bits, buffer.data());
+      std::copy_n(buffer.data() + skip, take, out.data() + done);
+      done += take;
+    }
+  }
 }
 
 }  // namespace
 
 double RandomStream::uniform(std::uint64_t index) const {
-  const auto p = uniform_pair(*this, index / 2);
-  return index % 2 == 0 ? p.first : p.second;
+  return to_unit(philox(philox_stream(*this), index / 2)[index % 2]);
 }
 
 void RandomStream::uniforms(std::uint64_t first, std::span<double> out) const {
-  fill(first, out, [&](std::uint64_t pair) { return uniform_pair(*this, pair); });
+  fill(*this, first, out, uniform_block);
 }
 
 void RandomStream::normals(std::uint64_t first, std::span<double> out) const {
-  fill(first, out, [&](std::uint64_t pair) { return normal_pair(*this, pair); });
+  fill(*this, first, out, normal_block);
+}
+
+void RandomStream::exponentials(std::uint64_t first, std::span<double> out) const {
+  fill(*this, first, out, exponential_block);
 }
 
 }  // namespace wienertree

@@ -25,12 +25,16 @@ struct RandomStream {
   std::uint32_t launch = 0;
   std::uint32_t step = 0;
   Purpose purpose = Purpose::thinning;
-  /// Uniform on the open interval (0,1), 53 bits: draw number `index` of this stream.
+  /// Uniform on the 2^52 numbers (k + 1/2) 2^-52, so never 0 nor 1: draw number `index` of this stream.
+  /// Many at once cost a tenth: `uniforms`.
   double uniform(std::uint64_t index) const;
-  /// Draws first .. first+out.size()-1.
+  /// Draws first .. first+out.size()-1; below number 2^49 streams of different purposes never meet.
   void uniforms(std::uint64_t first, std::span<double> out) const;
-  /// Standard normal draws (Box-Muller on pairs of uniforms): draws first .. first+out.size()-1.
+  /// Standard normal draws first .. first+out.size()-1. Box, Muller (1958, Ann. Math. Statist. 29, 610-611):
+  /// sqrt(-2 log u) (cos 2 pi v, sin 2 pi v), with (u, v) = uniforms (2i, 2i+1) of the stream.
   void normals(std::uint64_t first, std::span<double> out) const;
+  /// Standard exponential draws -log u, u the uniforms first .. first+out.size()-1.
+  void exponentials(std::uint64_t first, std::span<double> out) const;
 };
 
 }  // namespace wienertree
