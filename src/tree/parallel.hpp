@@ -1,0 +1,45 @@
+#pragma once
+/// A small persistent pool of threads for loops over blocks of nodes.
+#include <cstddef>
+#include <memory>
+#include <type_traits>
+
+namespace wienertree {
+
+/// Tasks are handed out in ascending order, so that a task may run on any thread: work must depend on the
+/// task only, never on the thread, which is there to choose scratch memory. A pool of size 1 has no thread of
+/// its own and runs everything in the caller's.
+class ThreadPool {
+ public:
+  /// @throws InputError if `threads` is 0
+  explicit ThreadPool(std::size_t threads = 1);
+  ~ThreadPool();
+  ThreadPool(const ThreadPool&) = delete;
+  ThreadPool& operator=(const ThreadPool&) = delete;
+
+  std::size_t size() const { return size_; }
+
+  /// Calls body(task, thread) for every task in 0..tasks-1, thread in 0..size()-1, and returns when all are
+  /// done. After an exception no further task starts, and the exception of the lowest task that threw is
+  /// rethrown: the same one for any number of threads. Not to be called from within a body, nor by two
+  /// callers at once. Allocates nothing.
+  template <class Body>
+  void for_each(std::size_t tasks, Body&& body) {
+    run(
+        tasks,
+        [](void* b, std::size_t task, std::size_t thread) {
+          (*static_cast<std::remove_reference_t<Body>*>(b))(task, thread);
+        },
+        const_cast<void*>(static_cast<const void*>(std::addressof(body))));
+  }
+
+ private:
+  using Call = void (*)(void* body, std::size_t task, std::size_t thread);
+  void run(std::size_t tasks, Call call, void* body);
+
+  struct Shared;
+  std::unique_ptr<Shared> shared_;
+  std::size_t size_;
+};
+
+}  // namespace wienertree
