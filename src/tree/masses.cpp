@@ -1,0 +1,135 @@
+#include "wienertree/tree/masses.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cassert>
+#include <cmath>
+#include <limits>
+#include <numeric>
+
+#include "wienertree/model/error.hpp"
+#include "wienertree/tree/clones.hpp"
+#include "wienertree/tree/elementary.hpp"
+
+namespace wienertree {
+namespace {
+
+constexpr std::size_t lanes = 8;    ///< partial sums: a fixed number, so that every clone adds in one order
+constexpr std::size_t chunk = 128;  ///< sites summed plainly before the compensated sum takes over
+
+struct Extremes {
+  double largest;
+  bool all_valid;  ///< no NaN, no +infinity
+};
+
+WIENERTREE_CLONES Extremes extremes(const double* log_weight, std::size_t n) {
+  std::array<double, lanes> largest;
+  std::array<std::uint64_t, lanes> invalid{};
+  largest.fill(-std::numeric_limits<double>::infinity());
+  const auto visit = [&](std::size_t l, double x) {
+    largest[l] = x > largest[l] ? x : largest[l];
+    invalid[l] |= x <= std::numeric_limits<double>::max() ? 0 : 1;
+  };
+  std::size_t i = 0;
+  for (; i + lanes <= n; i += lanes)
+    for (std::size_t l = 0; l < lanes; ++l) visit(l, log_weight[i + l]);
+  for (; i < n; ++i) visit(0, log_weight[i]);
+  return {*std::max_element(largest.begin(), largest.end()),
+          std::accumulate(invalid.begin(), invalid.end(), std::uint64_t{0}) == 0};
+}
+
+// w_i = exp(log_weight_i - largest) as bits into `weight`; returns their sum.
+WIENERTREE_CLONES double relative_weights(const double* log_weight, double largest, std::size_t n,
+                                          std::uint64_t* weight) {
+  std::array<double, lanes> sum{};
+  std::size_t i = 0;
+  for (; i + lanes <= n; i += lanes)
+    for (std::size_t l = 0; l < lanes; ++l) {
+      const double w = elementary::exp_nonpositive(log_weight[i + l] - largest);
+      weight[i + l] = std::bit_cast<std::uint64_t>(w);
+      sum[l] += w;
+    }
+  double total = 0;
+  for (; i < n; ++i) {
+    const double w = elementary::exp_nonpositive(log_weight[i] - largest);
+    weight[i] = std::bit_cast<std::uint64_t>(w);
+    total += w;
+  }
+  for (const double s : sum) total += s;
+  return total;
+}
+
+// Neumaier (1974, Z. angew. Math. Mech. 54, 39-51).
+class CompensatedSum {
+ public:
+  void add(double x) {
+    const double next = sum_ + x;
+    error_ += std::abs(sum_) >= std::abs(x) ? (sum_ - next) + x : (x - next) + sum_;
+    sum_ = next;
+  }
+  double value() const { return sum_ + error_; }
+
+ private:
+  double sum_ = 0, error_ = 0;
+};
+
+[[noreturn]] void refuse(std::span<const double> log_weight) {
+  const std::string sites = fmt::format("{} sites", log_weight.size());
+  for (std::size_t i = 0; i < log_weight.size(); ++i)
+    if (!(log_weight[i] <= std::numeric_limits<double>::max()))
+      throw RunError(
+          fmt::format("the log-weight of site {} of {} is not a number below infinity", i, log_weight.size()),
+          "thinning", fmt::format("{}", log_weight[i]));
+  throw RunError("no site has a positive weight", "thinning", sites);
+}
+
+}  // namespace
+
+void assign_masses(std::span<const double> log_weight, std::uint64_t particles, ParticleMasses& out) {
+  const std::size_t n = log_weight.size();
+  if (particles < 1 || particles > largest_particle_number)
+    throw InputError(fmt::format("the number of particles must lie in 1..{}", largest_particle_number),
+                     "thinning", fmt::format("{}", particles));
+  if (n > std::numeric_limits<std::uint32_t>::max())
+    throw InputError("too many sites for 32-bit indices", "thinning", fmt::format("{}", n));
+  const auto [largest, all_valid] = extremes(log_weight.data(), n);
+  if (!all_valid || largest == -std::numeric_limits<double>::infinity()) refuse(log_weight);
+
+  out.mass.resize(n);
+  CompensatedSum sum;
+  for (std::size_t first = 0; first < n; first += chunk)
+    sum.add(relative_weights(log_weight.data() + first, largest, std::min(chunk, n - first),
+                             out.mass.data() + first));
+  const double total = sum.value();
+  out.particles = particles;
+  out.fraction_bits = 63 - static_cast<int>(std::bit_width(particles));
+  out.log_total = largest + std::log(total);
+
+  // w_i <= 1 <= total, so a product is at most N 2^B < 2^63 up to rounding.
+  const double scale = std::ldexp(static_cast<double>(particles), out.fraction_bits) / total;
+  std::uint64_t assigned = 0;
+  for (std::uint64_t& m : out.mass) {
+    m = static_cast<std::uint64_t>(static_cast<std::int64_t>(std::bit_cast<double>(m) * scale + 0.5));
+    assigned += m;
+  }
+  const auto heaviest =
+      static_cast<std::size_t>(std::find(log_weight.begin(), log_weight.end(), largest) - log_weight.begin());
+  out.mass[heaviest] += (particles << out.fraction_bits) - assigned;  // modulo 2^64: may subtract
+}
+
+void split_mass(std::uint64_t mass, std::span<const double> lambda, std::span<std::uint64_t> children) {
+  assert(lambda.size() == children.size() && !lambda.empty() && mass < std::uint64_t{1} << 63);
+  std::uint64_t assigned = 0;
+  for (std::size_t j = 0; j < lambda.size(); ++j) {
+    children[j] = static_cast<std::uint64_t>(static_cast<double>(mass) * lambda[j]);
+    assigned += children[j];
+  }
+  const auto largest =
+      static_cast<std::size_t>(std::max_element(lambda.begin(), lambda.end()) - lambda.begin());
+  children[largest] += mass - assigned;  // modulo 2^64: may subtract
+}
+
+}  // namespace wienertree
