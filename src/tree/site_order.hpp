@@ -1,0 +1,51 @@
+#pragma once
+/// The order in which the random methods visit the sites. In spatial order neighbouring particles come from
+/// neighbouring sites, and the error of a mean falls faster than N^{-1/2}: Hammersley's remark for d = 1;
+/// Gerber, Chopin (2015), "Sequential quasi Monte Carlo", J. R. Stat. Soc. B 77, 509-579, for Hilbert's
+/// curve.
+#include <array>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "wienertree/tree/hilbert.hpp"
+#include "wienertree/tree/masses.hpp"
+#include "wienertree/tree/thinning.hpp"
+
+namespace wienertree {
+
+/// Orders sites whose log-weight is not -infinity; reuses its buffers from call to call.
+class SiteOrdering {
+ public:
+  /// Parent by parent, branch by branch; storage order if sites.parents is 0.
+  /// @throws InputError if sites.parents does not divide the number of sites
+  void tree(const Sites& sites, std::vector<std::uint32_t>& visit);
+
+  /// Sorted in space, equal positions by index. Components that are constant over the sites do not count. If
+  /// one varies, exactly by its value. If k >= 2 vary, along a Hilbert curve over a grid of 2^min(16, [64/k])
+  /// cells a side, laid for each component between its weighted quantiles 1/64 and 63/64 widened by their
+  /// distance at both ends; what lies outside counts as on the border, so that a few outliers cost no
+  /// resolution.
+  /// @param masses of the same sites
+  /// @throws RunError naming the first site of positive weight whose state is not finite
+  /// @throws InputError if more than 64 components vary
+  void spatial(const Sites& sites, const ParticleMasses& masses, std::vector<std::uint32_t>& visit);
+
+ private:
+  struct Axis {
+    std::size_t component;
+    double low, scale;  ///< cell of x on a side of n cells: (x/4 - low) scale n, within 0..n-1
+  };
+  bool make_axis(const Sites& sites, std::span<const std::uint32_t> live, std::size_t component, Axis& axis);
+  void draw_sample(const ParticleMasses& masses);
+  void line_items(const Sites& sites, std::span<const std::uint32_t> live);
+  void curve_items(const Sites& sites, std::span<const std::uint32_t> live);
+
+  std::vector<Axis> axes_;
+  std::vector<std::uint32_t> sample_;
+  std::vector<double> sample_values_;
+  std::vector<std::uint64_t> items_, scratch_, keys_;
+  HilbertAxes cells_{};
+};
+
+}  // namespace wienertree
