@@ -1,0 +1,116 @@
+#include "wienertree/tree/counting.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "wienertree/model/error.hpp"
+#include "wienertree/tree/resampling.hpp"
+#include "wienertree/tree/tbba.hpp"
+
+namespace wienertree {
+namespace {
+
+void check_shapes(const Sites& sites) {
+  if (sites.x.nodes() != sites.log_weight.size())
+    throw InputError(fmt::format("{} states but {} log-weights", sites.x.nodes(), sites.log_weight.size()),
+                     "thinning");
+}
+
+void put_in_order(SiteOrder order, SiteOrdering& ordering, const Sites& sites, const ParticleMasses& masses,
+                  std::vector<std::uint32_t>& visit) {
+  if (order == SiteOrder::spatial)
+    ordering.spatial(sites, masses, visit);
+  else
+    ordering.tree(sites, visit);
+}
+
+}  // namespace
+
+CountingThinning::CountingThinning(ThinningMethod method, SiteOrder order)
+    : method_(method), order_(order), log_small_(256) {
+  for (std::size_t o = 1; o < log_small_.size(); ++o) log_small_[o] = std::log(static_cast<double>(o));
+}
+
+std::string_view CountingThinning::name() const {
+  switch (method_) {
+    case ThinningMethod::multinomial:
+      return "multinomial";
+    case ThinningMethod::residual:
+      return "residual";
+    case ThinningMethod::stratified:
+      return "stratified";
+    case ThinningMethod::systematic:
+      return "systematic";
+    default:
+      return "tbba";
+  }
+}
+
+void CountingThinning::thin(const Sites& sites, std::size_t budget, const RandomStream& random,
+                            Selection& out) {
+  check_shapes(sites);
+  assign_masses(sites.log_weight, budget, masses_);
+  put_in_order(order_, ordering_, sites, masses_, visit_);
+  visited_mass_.resize(visit_.size());
+  for (std::size_t i = 0; i < visit_.size(); ++i) visited_mass_[i] = masses_.mass[visit_[i]];
+  count_.resize(visit_.size());
+  count_particles(random);
+  collect(out);
+}
+
+void CountingThinning::count_particles(const RandomStream& random) {
+  const int bits = masses_.fraction_bits;
+  switch (method_) {
+    case ThinningMethod::multinomial:
+      return multinomial_counts(visited_mass_, bits, random, count_);
+    case ThinningMethod::residual:
+      return residual_counts(visited_mass_, bits, random, count_);
+    case ThinningMethod::stratified:
+      return stratified_counts(visited_mass_, bits, random, count_);
+    case ThinningMethod::systematic:
+      return systematic_counts(visited_mass_, bits, random, count_);
+    default:
+      break;
+  }
+  TbbaRemainder all{masses_.particles << bits, false};
+  tbba(visited_mass_, bits, random, 0, all, count_);
+}
+
+void CountingThinning::collect(Selection& out) {
+  const std::size_t most = std::min<std::size_t>(visit_.size(), masses_.particles) + 1;  // one to overwrite
+  out.site.resize(most);
+  out.count.resize(most);
+  out.log_weight.resize(most);
+  std::size_t kept = 0;
+  for (std::size_t i = 0; i < visit_.size(); ++i) {
+    out.site[kept] = visit_[i];
+    out.count[kept] = count_[i];
+    kept += count_[i] > 0 ? 1 : 0;
+  }
+  out.site.resize(kept);
+  out.count.resize(kept);
+  out.log_weight.resize(kept);
+  const double log_particle = masses_.log_total - std::log(static_cast<double>(masses_.particles));
+  for (std::size_t k = 0; k < kept; ++k) {
+    const std::uint32_t o = out.count[k];
+    out.log_weight[k] =
+        log_particle + (o < log_small_.size() ? log_small_[o] : std::log(static_cast<double>(o)));
+  }
+  out.discarded = 0;
+  out.moved_states.reshape(0, 0);
+}
+
+void KeepAll::thin(const Sites& sites, std::size_t, const RandomStream&, Selection& out) {
+  check_shapes(sites);
+  assign_masses(sites.log_weight, 1, masses_);
+  put_in_order(order_, ordering_, sites, masses_, out.site);
+  out.count.clear();
+  out.log_weight.resize(out.site.size());
+  for (std::size_t k = 0; k < out.site.size(); ++k) out.log_weight[k] = sites.log_weight[out.site[k]];
+  out.discarded = 0;
+  out.moved_states.reshape(0, 0);
+}
+
+}  // namespace wienertree
