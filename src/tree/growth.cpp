@@ -1,0 +1,151 @@
+#include "wienertree/tree/growth.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cassert>
+#include <cmath>
+#include <limits>
+#include <mutex>
+
+#include "wienertree/model/error.hpp"
+
+namespace wienertree {
+namespace {
+
+constexpr std::size_t nodes_a_task = 16 * flow_block;
+constexpr std::size_t most_branches = std::size_t{1} << 16;
+
+void shape_children(const Generation& parents, const CubatureFormula& formula, double s,
+                    Generation& children) {
+  const std::size_t branches = formula.paths.size(), nodes = parents.size();
+  assert(parents.log_weight.size() == nodes);
+  if (branches == 0 || branches > most_branches)
+    throw InputError(fmt::format("a formula needs between 1 and {} paths", most_branches), formula.name,
+                     fmt::format("{}", branches));
+  if (nodes > std::numeric_limits<std::uint32_t>::max() / branches)
+    throw InputError(
+        fmt::format("{} nodes along {} paths are too many children for 32-bit indices", nodes, branches),
+        "tree");
+  const std::size_t total = nodes * branches;
+  children.time = parents.time + s;
+  children.states.reshape(parents.states.components(), total);
+  children.log_weight.resize(total);
+  children.log_likelihood.resize(parents.log_likelihood.empty() ? 0 : total);
+  children.parent.resize(total);
+  children.branch.resize(total);
+  children.count.clear();
+}
+
+// Copies nodes first .. first+count-1 of the parents to their places along one branch.
+void plant(const Generation& parents, std::size_t branch, double log_lambda, std::size_t first,
+           std::size_t count, Generation& children) {
+  const std::size_t at = branch * parents.size() + first;
+  for (std::size_t i = 0; i < parents.states.components(); ++i)
+    std::copy_n(&parents.states.component(i)[first], count, &children.states.component(i)[at]);
+  for (std::size_t n = 0; n < count; ++n) {
+    children.log_weight[at + n] = parents.log_weight[first + n] + log_lambda;
+    children.parent[at + n] = static_cast<std::uint32_t>(first + n);
+    children.branch[at + n] = static_cast<std::uint16_t>(branch);
+  }
+  if (!parents.log_likelihood.empty())
+    std::copy_n(&parents.log_likelihood[first], count, &children.log_likelihood[at]);
+}
+
+template <class T>
+void gather(const std::vector<T>& from, std::span<const std::uint32_t> site, std::vector<T>& to) {
+  to.resize(from.empty() ? 0 : site.size());
+  if (from.empty()) return;
+  for (std::size_t k = 0; k < site.size(); ++k) to[k] = from[site[k]];
+}
+
+void copy_states(const Batch& from, Batch& to) {
+  to.reshape(from.components(), from.nodes());
+  for (std::size_t i = 0; i < from.components(); ++i) {
+    const auto x = from.component(i);
+    std::copy(x.begin(), x.end(), to.component(i).begin());
+  }
+}
+
+}  // namespace
+
+void grow(const Generation& parents, const CubatureFormula& formula, double s,
+          std::span<const std::unique_ptr<Flow>> flows, ThreadPool& threads, Generation& children,
+          std::vector<NodeFailure>& failures) {
+  if (flows.size() < threads.size())
+    throw InputError(fmt::format("{} threads need as many flows", threads.size()), "tree",
+                     fmt::format("{}", flows.size()));
+  shape_children(parents, formula, s, children);
+  failures.clear();
+  const std::size_t nodes = parents.size(), tasks_a_branch = (nodes + nodes_a_task - 1) / nodes_a_task;
+  std::mutex failures_mutex;
+  threads.for_each(formula.paths.size() * tasks_a_branch, [&](std::size_t task, std::size_t thread) {
+    const std::size_t branch = task / tasks_a_branch, first = task % tasks_a_branch * nodes_a_task;
+    const std::size_t count = std::min(nodes_a_task, nodes - first), at = branch * nodes + first;
+    const CubaturePath& path = formula.paths[branch];
+    plant(parents, branch, std::log(path.weight), first, count, children);
+    std::vector<NodeFailure> failed;
+    flows[thread]->move_along(path, s, children.states.view().nodes(at, count), failed);
+    if (failed.empty()) return;
+    for (NodeFailure& f : failed) f.node += at;
+    const std::lock_guard lock(failures_mutex);
+    failures.insert(failures.end(), failed.begin(), failed.end());
+  });
+  std::sort(failures.begin(), failures.end(),
+            [](const NodeFailure& a, const NodeFailure& b) { return a.node < b.node; });
+}
+
+TreeGrower::TreeGrower(const Model& model, FlowMethod method, FlowTolerance tolerance,
+                       CubatureFormula formula, std::size_t threads)
+    : TreeGrower(make_flow(method, model, tolerance, formula.degree), std::move(formula), threads) {}
+
+TreeGrower::TreeGrower(std::unique_ptr<Flow> flow, CubatureFormula formula, std::size_t threads)
+    : formula_(std::move(formula)), threads_(threads) {
+  flows_.push_back(std::move(flow));
+  while (flows_.size() < threads) flows_.push_back(flows_.front()->clone());
+}
+
+FlowStatistics TreeGrower::statistics() const {
+  FlowStatistics total;
+  for (const auto& flow : flows_) total += flow->statistics();
+  return total;
+}
+
+void select(const Generation& children, const Selection& selection, Generation& survivors) {
+  const std::span<const std::uint32_t> site = selection.site;
+  const std::size_t kept = site.size(), d = children.states.components();
+  assert(selection.log_weight.size() == kept && &children != &survivors);
+  for (const std::uint32_t i : site)
+    if (i >= children.size())
+      throw InputError(fmt::format("a selected site is not one of {} children", children.size()), "selection",
+                       fmt::format("{}", i));
+  survivors.time = children.time;
+  if (selection.moved_states.nodes() != 0) {
+    assert(selection.moved_states.nodes() == kept && selection.moved_states.components() == d);
+    copy_states(selection.moved_states, survivors.states);
+  } else {
+    survivors.states.reshape(d, kept);
+    for (std::size_t i = 0; i < d; ++i) {
+      const auto from = children.states.component(i);
+      const auto to = survivors.states.component(i);
+      for (std::size_t k = 0; k < kept; ++k) to[k] = from[site[k]];
+    }
+  }
+  survivors.log_weight = selection.log_weight;
+  survivors.count = selection.count;
+  gather(children.log_likelihood, site, survivors.log_likelihood);
+  gather(children.parent, site, survivors.parent);
+  gather(children.branch, site, survivors.branch);
+}
+
+void copy_generation(const Generation& from, Generation& to) {
+  to.time = from.time;
+  copy_states(from.states, to.states);
+  to.log_weight = from.log_weight;
+  to.log_likelihood = from.log_likelihood;
+  to.parent = from.parent;
+  to.branch = from.branch;
+  to.count = from.count;
+}
+
+}  // namespace wienertree
