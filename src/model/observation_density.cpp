@@ -1,0 +1,181 @@
+#include "wienertree/model/observation_density.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <boost/math/distributions/students_t.hpp>
+#include <cassert>
+#include <cmath>
+#include <numbers>
+
+namespace wienertree {
+
+namespace {
+
+using Value = TapeBuilder::Value;
+
+// log g(v), as in the header.
+Value log_density_of(const NoiseLaw& law, Value v, TapeBuilder& tape) {
+  const auto constant = [&](double c) { return tape.constant(c); };
+  const auto times = [&](double c, Value a) { return tape.binary(Op::multiply, constant(c), a); };
+  const auto plus = [&](double c, Value a) { return tape.binary(Op::add, a, constant(c)); };
+  const double log_root_two_pi = 0.5 * std::log(2.0 * std::numbers::pi);
+  const Value z = times(1.0 / law.scale, v);
+  switch (law.kind) {
+    case NoiseLaw::Kind::gaussian:
+      return plus(-log_root_two_pi - std::log(law.scale), times(-0.5, tape.binary(Op::multiply, z, z)));
+    case NoiseLaw::Kind::laplace:
+      return plus(-std::log(2.0 * law.scale), times(-1.0, tape.unary(Op::absolute, z)));
+    case NoiseLaw::Kind::student_t: {
+      const double n = law.dof;
+      const Value spread =
+          tape.unary(Op::logarithm, plus(1.0, times(1.0 / n, tape.binary(Op::multiply, z, z))));
+      const double log_normaliser = std::lgamma(0.5 * (n + 1.0)) - std::lgamma(0.5 * n) -
+                                    0.5 * std::log(n * std::numbers::pi) - std::log(law.scale);
+      return plus(log_normaliser, times(-0.5 * (n + 1.0), spread));
+    }
+    case NoiseLaw::Kind::log_chi_square:
+      break;
+  }
+  const Value excess = tape.binary(Op::subtract, v, tape.unary(Op::exponential, v));
+  return plus(-log_root_two_pi, times(0.5, excess));
+}
+
+// Inputs h_i, uniforms y_i, outputs log g_i(y_i - h_i).
+Tape log_densities(const std::vector<NoiseLaw>& laws) {
+  TapeBuilder builder(laws.size(), laws.size());
+  std::vector<Value> outputs;
+  for (std::size_t i = 0; i < laws.size(); ++i)
+    outputs.push_back(
+        log_density_of(laws[i], builder.binary(Op::subtract, builder.uniform(i), builder.input(i)), builder));
+  return builder.finish(outputs);
+}
+
+double draw(const NoiseLaw& law, double uniform, double normal) {
+  switch (law.kind) {
+    case NoiseLaw::Kind::gaussian:
+      return law.scale * normal;
+    case NoiseLaw::Kind::laplace:  // by inversion, from the nearer tail
+      return uniform < 0.5 ? law.scale * std::log(2.0 * uniform) : -law.scale * std::log(2.0 - 2.0 * uniform);
+    case NoiseLaw::Kind::student_t:
+      return law.scale * boost::math::quantile(boost::math::students_t(law.dof), uniform);
+    case NoiseLaw::Kind::log_chi_square:
+      break;
+  }
+  return 2.0 * std::log(std::abs(normal));
+}
+
+void check_law(const NoiseLaw& law) {
+  const auto positive = [](double value, const char* what) {
+    if (!(value > 0) || !std::isfinite(value))
+      throw InputError("must be positive", fmt::format("observation noise: {}", what),
+                       fmt::format("{}", value));
+  };
+  positive(law.scale, "scale");
+  if (law.kind == NoiseLaw::Kind::student_t) positive(law.dof, "dof");
+}
+
+class AdditiveNoise final : public ObservationDensity {
+ public:
+  AdditiveNoise(std::shared_ptr<const VectorFields> fields, std::vector<NoiseLaw> laws)
+      : fields_(std::move(fields)), laws_(std::move(laws)), log_densities_(log_densities(laws_)) {}
+
+  std::size_t observation_dimension() const override { return laws_.size(); }
+
+  void log_density(std::span<const double> y, ConstBatchView x, std::span<double> out) const override {
+    assert(y.size() == laws_.size() && out.size() == x.nodes());
+    const std::size_t k = laws_.size();
+    thread_local Batch h, densities;
+    thread_local std::vector<const double*> inputs;
+    thread_local std::vector<double*> outputs;
+    h.reshape(k, x.nodes());
+    densities.reshape(k, x.nodes());
+    fields_->sensor(x, h);
+    inputs.clear();
+    outputs.clear();
+    for (std::size_t i = 0; i < k; ++i) {
+      inputs.push_back(h.component(i).data());
+      outputs.push_back(densities.component(i).data());
+    }
+    log_densities_.evaluate(inputs, y, outputs, x.nodes());
+    std::fill(out.begin(), out.end(), 0.0);
+    for (std::size_t i = 0; i < k; ++i) {
+      if (std::isnan(y[i])) continue;
+      const double* const term = densities.component(i).data();
+      for (std::size_t n = 0; n < out.size(); ++n) out[n] += term[n];
+    }
+  }
+
+  void sample(std::span<const double> x, std::span<const double> uniforms, std::span<const double> normals,
+              std::span<double> y) const override {
+    assert(uniforms.size() == laws_.size() && normals.size() == laws_.size() && y.size() == laws_.size());
+    fields_->sensor({x.data(), x.size(), 1, 1}, {y.data(), y.size(), 1, 1});
+    for (std::size_t i = 0; i < y.size(); ++i) y[i] += draw(laws_[i], uniforms[i], normals[i]);
+  }
+
+  std::vector<double> gaussian_variances() const override {
+    std::vector<double> variances;
+    for (const NoiseLaw& law : laws_) {
+      if (law.kind != NoiseLaw::Kind::gaussian) return {};
+      variances.push_back(law.scale * law.scale);
+    }
+    return variances;
+  }
+
+ private:
+  std::shared_ptr<const VectorFields> fields_;
+  std::vector<NoiseLaw> laws_;
+  Tape log_densities_;
+};
+
+class TapeDensity final : public ObservationDensity {
+ public:
+  TapeDensity(Tape log_likelihood, std::string name)
+      : log_likelihood_(std::move(log_likelihood)), name_(std::move(name)) {}
+
+  std::size_t observation_dimension() const override { return log_likelihood_.uniforms(); }
+
+  void log_density(std::span<const double> y, ConstBatchView x, std::span<double> out) const override {
+    assert(y.size() == observation_dimension() && out.size() == x.nodes());
+    const auto missing = std::count_if(y.begin(), y.end(), [](double v) { return std::isnan(v); });
+    if (missing == static_cast<std::ptrdiff_t>(y.size())) {
+      std::fill(out.begin(), out.end(), 0.0);
+      return;
+    }
+    if (missing > 0)
+      throw InputError("some components of an observation are missing, and this density cannot be split",
+                       name_, fmt::format("{} of {} missing", missing, y.size()));
+    thread_local std::vector<const double*> inputs;
+    inputs.clear();
+    for (std::size_t i = 0; i < x.components(); ++i) inputs.push_back(x.component(i).data());
+    double* const output = out.data();
+    log_likelihood_.evaluate(inputs, y, std::span(&output, 1), x.nodes());
+  }
+
+  void sample(std::span<const double>, std::span<const double>, std::span<const double>,
+              std::span<double>) const override {
+    throw InputError("observations cannot be drawn from a density given as an expression", name_);
+  }
+
+ private:
+  Tape log_likelihood_;
+  std::string name_;
+};
+
+}  // namespace
+
+std::unique_ptr<ObservationDensity> make_additive_noise(std::shared_ptr<const VectorFields> fields,
+                                                        std::vector<NoiseLaw> laws) {
+  if (laws.size() != fields->sensor_dimension())
+    throw InputError(
+        fmt::format("one law of the noise for each of {} components of h", fields->sensor_dimension()),
+        "observation noise", std::to_string(laws.size()));
+  for (const NoiseLaw& law : laws) check_law(law);
+  return std::make_unique<AdditiveNoise>(std::move(fields), std::move(laws));
+}
+
+std::unique_ptr<ObservationDensity> make_tape_density(Tape log_likelihood, std::string name) {
+  return std::make_unique<TapeDensity>(std::move(log_likelihood), std::move(name));
+}
+
+}  // namespace wienertree

@@ -1,0 +1,12 @@
+#pragma once
+/// From a model's source and coefficients to the model.
+#include "wienertree/model/model.hpp"
+#include "wienertree/model/text/field_expressions.hpp"
+
+namespace wienertree::text {
+
+/// All but the exact filter. @throws InputError naming the place
+Model assemble(const ModelSource& source, const FieldExpressions& bound,
+               const std::vector<double>& parameters);
+
+}  // namespace wienertree::text

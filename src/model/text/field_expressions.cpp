@@ -1,0 +1,283 @@
+#include "wienertree/model/text/field_expressions.hpp"
+
+#include <fmt/format.h>
+
+#include <cmath>
+
+#include "wienertree/model/text/symbolic.hpp"
+
+namespace wienertree::text {
+
+namespace {
+
+using GiNaC::ex;
+using GiNaC::exvector;
+using GiNaC::numeric;
+
+std::vector<std::string> names(const std::vector<NamedExpression>& list) {
+  std::vector<std::string> result;
+  for (const NamedExpression& entry : list) result.push_back(entry.name);
+  return result;
+}
+
+std::vector<std::string> names(const std::vector<StateSource>& list) {
+  std::vector<std::string> result;
+  for (const StateSource& entry : list) result.push_back(entry.name);
+  return result;
+}
+
+Symbols symbols_of(const ModelSource& source) { return {names(source.parameters), names(source.states)}; }
+
+// What the algebra makes of valid input may still have a pole or leave the real numbers.
+template <class F>
+auto at_place(const SourceExpression& source, F&& f) {
+  try {
+    return f();
+  } catch (const Error&) {
+    throw;
+  } catch (const std::exception& error) {
+    throw InputError("this expression is not a finite real number everywhere it must be",
+                     source.location.text(), error.what());
+  }
+}
+
+class Derivation {
+ public:
+  explicit Derivation(const ModelSource& source)
+      : source_(source),
+        symbols_(symbols_of(source)),
+        scope_{symbols_, source.parameters.size(), true, false} {}
+
+  SymbolicModel operator()(bool with_brackets) {
+    read();
+    add_clock();
+    derive_fields();
+    result_.coefficients.d = d_;
+    result_.coefficients.p = p_;
+    convert_fields();
+    convert_sensor();
+    if (with_brackets) derive_brackets();
+    return std::move(result_);
+  }
+
+ private:
+  void read() {
+    d_ = source_.states.size();
+    p_ = source_.noise_dimension();
+    for (const SourceExpression& drift : source_.drift) given_drift_.push_back(parse(drift, scope_));
+    diffusion_.assign(p_, exvector(d_));
+    for (std::size_t i = 0; i < d_; ++i)
+      for (std::size_t j = 0; j < p_; ++j) diffusion_[j][i] = parse(source_.diffusion[i][j], scope_);
+    for (const SourceExpression& h : source_.observation.h) sensor_.push_back(parse(h, scope_));
+    if (source_.observation.log_likelihood) {
+      Scope with_observations = scope_;
+      with_observations.observations = true;
+      log_likelihood_ = parse(*source_.observation.log_likelihood, with_observations);
+    }
+  }
+
+  void add_clock() {
+    const ex t = symbols_.state(d_);
+    bool used = log_likelihood_.has(t);
+    for (const ex& e : given_drift_) used = used || e.has(t);
+    for (const exvector& V : diffusion_)
+      for (const ex& e : V) used = used || e.has(t);
+    for (const ex& e : sensor_) used = used || e.has(t);
+    result_.coefficients.has_clock = used;
+    if (!used) return;
+    given_drift_.push_back(1);
+    for (exvector& V : diffusion_) V.push_back(0);
+    ++d_;
+  }
+
+  const SourceExpression& source_of(std::size_t k, std::size_t i) const {
+    const std::size_t last = std::min(i, source_.states.size() - 1);
+    return k == 0 ? source_.drift[last] : source_.diffusion[last][k - 1];
+  }
+
+  ex derivative(const ex& e, std::size_t l) const { return e.diff(symbols_.state(l)); }
+
+  void derive_fields() {
+    // 1/2 sum_{j,l} V_j^l dV_j^i/dx_l
+    exvector correction(d_);
+    for (std::size_t i = 0; i < d_; ++i)
+      for (std::size_t j = 0; j < p_; ++j)
+        for (std::size_t l = 0; l < d_; ++l)
+          if (!diffusion_[j][l].is_zero())
+            correction[i] += at_place(source_of(j + 1, i), [&]() -> ex {
+              return diffusion_[j][l] * derivative(diffusion_[j][i], l) * numeric(1, 2);
+            });
+    const bool ito = source_.convention == Convention::ito;
+    exvector stratonovich(d_);
+    for (std::size_t i = 0; i < d_; ++i) {
+      stratonovich[i] = ito ? given_drift_[i] - correction[i] : given_drift_[i];
+      ito_drift_.push_back(ito ? given_drift_[i] : given_drift_[i] + correction[i]);
+    }
+    V_.push_back(std::move(stratonovich));
+    V_.insert(V_.end(), diffusion_.begin(), diffusion_.end());
+  }
+
+  void convert_fields() {
+    FieldExpressions& c = result_.coefficients;
+    for (std::size_t i = 0; i < d_; ++i) c.ito_drift.push_back(converted(ito_drift_[i], source_of(0, i)));
+    for (std::size_t k = 0; k <= p_; ++k) {
+      std::vector<Expression> V, jacobian;
+      for (std::size_t i = 0; i < d_; ++i) V.push_back(converted(V_[k][i], source_of(k, i)));
+      for (std::size_t i = 0; i < d_; ++i)
+        for (std::size_t l = 0; l < d_; ++l) {
+          const bool depends = contains(V[i], Role::state, l);
+          jacobian.push_back(depends ? converted_derivative(V_[k][i], l, source_of(k, i))
+                                     : result_.arena->number(0));
+        }
+      c.fields.push_back(std::move(V));
+      c.jacobians.push_back(std::move(jacobian));
+    }
+  }
+
+  void convert_sensor() {
+    FieldExpressions& c = result_.coefficients;
+    for (std::size_t i = 0; i < sensor_.size(); ++i) {
+      const SourceExpression& place = source_.observation.h[i];
+      c.sensor.push_back(converted(sensor_[i], place));
+      exvector gradient;
+      for (std::size_t l = 0; l < d_; ++l) {
+        gradient.push_back(at_place(place, [&] { return derivative(sensor_[i], l); }));
+        c.sensor_gradient.push_back(converted(gradient.back(), place));
+      }
+      for (std::size_t r = 1; r <= p_; ++r) {
+        ex along = 0;
+        for (std::size_t l = 0; l < d_; ++l) along += V_[r][l] * gradient[l];
+        c.sensor_derivative.push_back(converted(along, place));
+      }
+    }
+    if (!source_.observation.log_likelihood) return;
+    const SourceExpression& place = *source_.observation.log_likelihood;
+    c.log_likelihood = converted(log_likelihood_, place);
+    c.observation_components = symbols_.observations();
+    if (c.observation_components == 0)
+      throw InputError("must depend on the observation, y1, y2, ..", place.location.text());
+    for (const Symbols::Entry& entry : symbols_.entries())
+      if (entry.name.size() > 1 && entry.name[0] == 'y' &&
+          entry.name.find_first_not_of("0123456789", 1) == std::string::npos)
+        throw InputError("with `log_likelihood`, y1, y2, .. are the observation; rename this",
+                         place.location.text(), entry.name);
+  }
+
+  void derive_brackets() {
+    for (std::size_t i = 0; i <= p_; ++i)
+      for (std::size_t j = i + 1; j <= p_; ++j) {
+        Bracket bracket{i, j, {}};
+        for (std::size_t m = 0; m < d_; ++m) {
+          ex component = 0;
+          for (std::size_t l = 0; l < d_; ++l)
+            component += V_[i][l] * derivative(V_[j][m], l) - V_[j][l] * derivative(V_[i][m], l);
+          bracket.components.push_back(converted(component, source_of(j, m)));
+        }
+        result_.brackets.push_back(std::move(bracket));
+      }
+  }
+
+  Expression converted(const ex& e, const SourceExpression& place) {
+    return at_place(place, [&] { return Conversion(symbols_, *result_.arena)(e); });
+  }
+  Expression converted_derivative(const ex& e, std::size_t l, const SourceExpression& place) {
+    return converted(at_place(place, [&] { return derivative(e, l); }), place);
+  }
+
+  const ModelSource& source_;
+  Symbols symbols_;
+  Scope scope_;
+  std::size_t d_ = 0, p_ = 0;
+  exvector given_drift_, ito_drift_, sensor_;
+  std::vector<exvector> diffusion_, V_;  // V_j of the source; V_0 .. V_p in Stratonovich form
+  ex log_likelihood_;
+  SymbolicModel result_{std::make_shared<Arena>(), {}, {}};
+};
+
+// The bound value of an expression of the first `count` parameters.
+double value_of(const SourceExpression& expression, Symbols& symbols, std::size_t count,
+                const std::vector<double>& parameters) {
+  Arena arena;
+  const ex parsed = parse(expression, {symbols, count, false, false});
+  const Expression e = at_place(expression, [&] { return Conversion(symbols, arena)(parsed); });
+  return substitute(e, parameters, arena, expression.location.text())->number;
+}
+
+}  // namespace
+
+SymbolicModel derive(const ModelSource& source, bool with_brackets) {
+  const std::lock_guard lock(symbolic_mutex());
+  return Derivation(source)(with_brackets);
+}
+
+FieldExpressions substitute(const FieldExpressions& coefficients, const ModelSource& source,
+                            const std::vector<double>& parameters, Arena& arena) {
+  FieldExpressions result = coefficients;
+  const auto substitute_all = [&](std::vector<Expression>& list, const auto& place_of) {
+    for (std::size_t i = 0; i < list.size(); ++i)
+      list[i] = substitute(list[i], parameters, arena, place_of(i).location.text());
+  };
+  const std::size_t d = coefficients.d, last = source.states.size() - 1;
+  const auto drift_place = [&](std::size_t i) -> const SourceExpression& {
+    return source.drift[std::min(i, last)];
+  };
+  substitute_all(result.ito_drift, drift_place);
+  for (std::size_t k = 0; k <= coefficients.p; ++k) {
+    const auto place = [&](std::size_t i) -> const SourceExpression& {
+      return k == 0 ? drift_place(i) : source.diffusion[std::min(i, last)][k - 1];
+    };
+    substitute_all(result.fields[k], place);
+    substitute_all(result.jacobians[k],
+                   [&](std::size_t i) -> const SourceExpression& { return place(i / d); });
+  }
+  const auto& h = source.observation.h;
+  substitute_all(result.sensor, [&](std::size_t i) -> const SourceExpression& { return h[i]; });
+  substitute_all(result.sensor_gradient, [&](std::size_t i) -> const SourceExpression& { return h[i / d]; });
+  substitute_all(result.sensor_derivative,
+                 [&](std::size_t i) -> const SourceExpression& { return h[i / coefficients.p]; });
+  if (result.log_likelihood)
+    result.log_likelihood = substitute(*result.log_likelihood, parameters, arena,
+                                       source.observation.log_likelihood->location.text());
+  return result;
+}
+
+std::vector<double> parameter_values(const ModelSource& source,
+                                     const std::vector<std::pair<std::string, double>>& overrides) {
+  const std::vector<std::string> known = names(source.parameters);
+  std::vector<const double*> replaced(known.size(), nullptr);
+  for (const auto& [name, value] : overrides) {
+    const std::string place = Location{source.file, 0, 0, "override of " + name}.text();
+    const auto found = std::find(known.begin(), known.end(), name);
+    if (found == known.end()) throw InputError("unknown parameter" + suggestion(name, known), place, name);
+    if (!std::isfinite(value)) throw InputError("must be a finite number", place, fmt::format("{}", value));
+    replaced[static_cast<std::size_t>(found - known.begin())] = &value;
+  }
+  const std::lock_guard lock(symbolic_mutex());
+  Symbols symbols = symbols_of(source);
+  std::vector<double> values;
+  for (std::size_t i = 0; i < known.size(); ++i)
+    values.push_back(replaced[i] != nullptr ? *replaced[i]
+                                            : value_of(source.parameters[i].value, symbols, i, values));
+  return values;
+}
+
+double constant_value(const SourceExpression& expression, const ModelSource& source,
+                      const std::vector<double>& parameters) {
+  const std::lock_guard lock(symbolic_mutex());
+  Symbols symbols = symbols_of(source);
+  return value_of(expression, symbols, parameters.size(), parameters);
+}
+
+Expression state_expression(const SourceExpression& expression, const ModelSource& source, bool has_clock,
+                            const std::vector<double>& parameters, Arena& arena) {
+  const std::lock_guard lock(symbolic_mutex());
+  Symbols symbols = symbols_of(source);
+  const ex parsed = parse(expression, {symbols, parameters.size(), true, false});
+  if (!has_clock && parsed.has(symbols.state(source.states.size())))
+    throw InputError("this model does not depend on the time, so that t is not at hand",
+                     expression.location.text(), expression.text);
+  const Expression e = at_place(expression, [&] { return Conversion(symbols, arena)(parsed); });
+  return substitute(e, parameters, arena, expression.location.text());
+}
+
+}  // namespace wienertree::text

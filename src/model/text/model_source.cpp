@@ -1,0 +1,214 @@
+#include "wienertree/model/text/model_source.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "wienertree/model/text/lexer.hpp"
+#include "wienertree/model/text/toml_section.hpp"
+
+namespace wienertree::text {
+
+namespace {
+
+std::vector<std::string_view> split_lines(std::string_view text) {
+  std::vector<std::string_view> lines;
+  while (true) {
+    const std::size_t end = text.find('\n');
+    lines.push_back(text.substr(0, end));
+    if (end == std::string_view::npos) return lines;
+    text.remove_prefix(end + 1);
+  }
+}
+
+void check_name(const std::string& name, const Location& location) {
+  if (!is_identifier(name))
+    throw InputError("a name is made of letters, digits and _ and does not start with a digit",
+                     location.text(), name.substr(0, 80));
+  if (name == "t" || name == "pi")
+    throw InputError(fmt::format("'{}' is the name of {}", name, name == "t" ? "the time" : "the constant"),
+                     location.text());
+}
+
+std::vector<NamedExpression> read_parameters(const Section& section) {
+  std::vector<NamedExpression> result;
+  for (const std::string& name : section.keys()) {
+    check_name(name, section.location(name));
+    result.push_back({name, section.expression(name)});
+  }
+  return result;
+}
+
+std::vector<StateSource> read_states(const Section& section, const std::vector<NamedExpression>& parameters) {
+  std::vector<StateSource> result;
+  for (const std::string& name : section.keys()) {
+    const Section entry = section.section(name);
+    StateSource state;
+    state.name = name;
+    state.location = section.location(name);
+    check_name(name, state.location);
+    for (const NamedExpression& parameter : parameters)
+      if (parameter.name == name)
+        throw InputError("this name is already that of a parameter", state.location.text(), name);
+    entry.only({"initial", "lower", "upper", "boundary"});
+    if (entry.has("initial")) state.initial = entry.expression("initial");
+    if (entry.has("lower")) state.lower = entry.expression("lower");
+    if (entry.has("upper")) state.upper = entry.expression("upper");
+    if (entry.has("boundary")) {
+      constexpr std::array kinds{Boundary::error, Boundary::clamp, Boundary::absorb};
+      state.boundary = kinds.at(entry.choice("boundary", {"error", "clamp", "absorb"}));
+      if (!state.lower && !state.upper)
+        throw InputError("a boundary needs `lower` or `upper`", entry.location("boundary").text());
+    }
+    result.push_back(std::move(state));
+  }
+  if (result.empty()) throw InputError("a model has at least one state", section.location().text());
+  return result;
+}
+
+// Checks that the keys of [drift] and [diffusion] are the states, no more and no fewer.
+void check_components(const Section& section, const std::vector<StateSource>& states) {
+  std::vector<std::string> names;
+  for (const StateSource& state : states) names.push_back(state.name);
+  for (const std::string& key : section.keys())
+    if (std::find(names.begin(), names.end(), key) == names.end())
+      throw InputError("no such state" + suggestion(key, names), section.location(key).text(), key);
+}
+
+void read_dynamics(const Section& root, ModelSource& model) {
+  const Section drift = root.section("drift"), diffusion = root.section("diffusion");
+  check_components(drift, model.states);
+  check_components(diffusion, model.states);
+  for (const StateSource& state : model.states) {
+    model.drift.push_back(drift.expression(state.name));
+    model.diffusion.push_back(diffusion.expressions(state.name));
+    const std::size_t entries = model.diffusion.back().size(), p = model.diffusion.front().size();
+    const std::string place = diffusion.location(state.name).text();
+    if (entries == 0) throw InputError("needs an entry for every Brownian motion, at least one", place);
+    if (entries != p)
+      throw InputError(fmt::format("wrong shape: one entry per Brownian motion, {} as for {}", p,
+                                   model.states.front().name),
+                       place, std::to_string(entries));
+  }
+}
+
+NoiseSource read_noise(const Section& section) {
+  section.only({"law", "sd", "scale", "dof"});
+  std::vector<std::string> names;
+  for (const NoiseLawName& known : noise_laws) names.emplace_back(known.law);
+  const NoiseLawName& law = noise_laws.at(section.choice("law", names));
+  NoiseSource result{std::string(law.law), section.location(), {}};
+  for (const std::string_view parameter : law.parameters)
+    if (!parameter.empty())
+      result.parameters.push_back({std::string(parameter), section.expression(parameter)});
+  for (const std::string& key : section.keys())
+    if (key != "law" && key != law.parameters[0] && key != law.parameters[1])
+      throw InputError(fmt::format("the law {} has no such parameter", law.law), section.location(key).text(),
+                       key);
+  return result;
+}
+
+void forbid(const Section& section, std::initializer_list<const char*> keys, const char* reason) {
+  for (const char* key : keys)
+    if (section.has(key)) throw InputError(reason, section.location(key).text());
+}
+
+ObservationSource read_observation(const Section& section) {
+  section.only({"kind", "h", "noise", "timing", "log_likelihood"});
+  ObservationSource result;
+  result.location = section.location();
+  const bool continuous = section.choice("kind", {"continuous", "discrete"}) == 0;
+  result.kind = continuous ? ObservationKind::continuous : ObservationKind::discrete;
+  if (continuous)
+    forbid(section, {"noise", "timing", "log_likelihood"},
+           "belongs to discrete observations; the noise of continuous ones is a unit Brownian motion");
+  if (section.has("timing"))
+    result.timing = section.choice("timing", {"current", "previous"}) == 0 ? ObservationTiming::current
+                                                                           : ObservationTiming::previous;
+  if (section.has("log_likelihood")) {
+    forbid(section, {"h", "noise"}, "`log_likelihood` stands instead of `h` and `noise`");
+    result.log_likelihood = section.expression("log_likelihood");
+    return result;
+  }
+  result.h = section.expressions("h");
+  if (result.h.empty()) throw InputError("needs at least one expression", section.location("h").text());
+  if (continuous) return result;
+  for (const Section& noise : section.sections("noise")) result.noise.push_back(read_noise(noise));
+  if (result.noise.size() != 1 && result.noise.size() != result.h.size())
+    throw InputError(
+        fmt::format("needs one law for all components of h, or one for each of {}", result.h.size()),
+        section.location("noise").text(), std::to_string(result.noise.size()));
+  return result;
+}
+
+void check_size(const std::vector<SourceExpression>& list, std::size_t d, const Location& location) {
+  if (list.size() != d)
+    throw InputError(fmt::format("needs {} entries, one per state", d), location.text(),
+                     std::to_string(list.size()));
+}
+
+InitialSource read_initial(const Section& section, std::size_t d) {
+  section.only({"mean", "covariance"});
+  InitialSource result;
+  result.location = section.location();
+  if (section.has("mean")) {
+    result.mean = section.expressions("mean");
+    check_size(result.mean, d, section.location("mean"));
+  }
+  result.covariance = section.matrix("covariance");
+  const Location place = section.location("covariance");
+  if (result.covariance.size() != d)
+    throw InputError(fmt::format("needs {} rows, one per state", d), place.text(),
+                     std::to_string(result.covariance.size()));
+  for (const auto& row : result.covariance) check_size(row, d, place);
+  return result;
+}
+
+ExactClaim read_exact(const Section& section) {
+  section.only({"filter"});
+  constexpr std::array filters{ExactFilter::benes, ExactFilter::kalman_bucy, ExactFilter::kalman};
+  return {filters.at(section.choice("filter", {"benes", "kalman-bucy", "kalman"})),
+          section.location("filter")};
+}
+
+std::string stem(std::string file) {
+  file.erase(0, file.find_last_of('/') + 1);
+  if (const std::size_t dot = file.find_last_of('.'); dot != std::string::npos && dot > 0) file.resize(dot);
+  return file;
+}
+
+ModelSource read(const toml::table& table, const TomlFile& file) {
+  const Section root(file, table, "");
+  root.only(
+      {"name", "convention", "parameters", "state", "drift", "diffusion", "observation", "initial", "exact"});
+  ModelSource model;
+  model.file = file.name;
+  model.name = root.has("name") ? root.string("name") : stem(file.name);
+  model.convention =
+      root.choice("convention", {"ito", "stratonovich"}) == 0 ? Convention::ito : Convention::stratonovich;
+  if (root.has("parameters")) model.parameters = read_parameters(root.section("parameters"));
+  model.states = read_states(root.section("state"), model.parameters);
+  read_dynamics(root, model);
+  if (root.has("observation")) model.observation = read_observation(root.section("observation"));
+  if (root.has("initial")) model.initial = read_initial(root.section("initial"), model.states.size());
+  if (root.has("exact")) model.exact = read_exact(root.section("exact"));
+  const bool has_mean = model.initial && !model.initial->mean.empty();
+  for (const StateSource& state : model.states)
+    if (!state.initial && !has_mean)
+      throw InputError("missing key `initial`", state.location.text(), state.name);
+  return model;
+}
+
+}  // namespace
+
+ModelSource read_model(std::string_view text, const std::string& file) {
+  const TomlFile toml_file{file, split_lines(text)};
+  try {
+    return read(toml::parse(text, file), toml_file);
+  } catch (const toml::parse_error& error) {
+    const Location place{file, error.source().begin.line, error.source().begin.column, ""};
+    throw InputError("TOML syntax: " + std::string(error.description()), place.text());
+  }
+}
+
+}  // namespace wienertree::text

@@ -1,0 +1,83 @@
+#pragma once
+/// A model file as read: every key checked for its name and type, expressions still text.
+#include <array>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "wienertree/model/model.hpp"
+#include "wienertree/model/text/location.hpp"
+
+namespace wienertree::text {
+
+struct NamedExpression {
+  std::string name;
+  SourceExpression value;
+};
+
+struct StateSource {
+  std::string name;
+  Location location;
+  std::optional<SourceExpression> initial, lower, upper;
+  Boundary boundary = Boundary::error;
+};
+
+/// A law of the observation noise with its parameters, e.g. {"student-t", {{"dof", ..}, {"scale", ..}}}.
+struct NoiseSource {
+  std::string law;
+  Location location;
+  std::vector<NamedExpression> parameters;  ///< in the order of `noise_laws`
+};
+
+/// The laws of the language and the parameters each needs.
+struct NoiseLawName {
+  std::string_view law;
+  std::array<std::string_view, 2> parameters;  ///< empty where it has fewer
+};
+inline constexpr std::array<NoiseLawName, 4> noise_laws{{{"gaussian", {"sd", ""}},
+                                                         {"laplace", {"scale", ""}},
+                                                         {"student-t", {"dof", "scale"}},
+                                                         {"log-chi-square", {"", ""}}}};
+
+struct ObservationSource {
+  ObservationKind kind = ObservationKind::none;
+  ObservationTiming timing = ObservationTiming::current;
+  Location location;
+  std::vector<SourceExpression> h;
+  std::vector<NoiseSource> noise;  ///< one for all components, or one per component
+  std::optional<SourceExpression> log_likelihood;
+};
+
+struct InitialSource {
+  Location location;
+  std::vector<SourceExpression> mean;  ///< empty: the states' `initial`
+  std::vector<std::vector<SourceExpression>> covariance;
+};
+
+struct ExactClaim {
+  ExactFilter filter;
+  Location location;
+};
+
+enum class Convention { ito, stratonovich };
+
+struct ModelSource {
+  std::string file, name;
+  Convention convention = Convention::ito;
+  std::vector<NamedExpression> parameters;
+  std::vector<StateSource> states;                       ///< d
+  std::vector<SourceExpression> drift;                   ///< d
+  std::vector<std::vector<SourceExpression>> diffusion;  ///< d lists of p
+  ObservationSource observation;
+  std::optional<InitialSource> initial;
+  std::optional<ExactClaim> exact;
+
+  std::size_t noise_dimension() const { return diffusion.front().size(); }
+};
+
+/// @throws InputError naming file, line and key: TOML syntax, unknown or missing keys, wrong types, wrong
+/// shapes, duplicate or reserved names
+ModelSource read_model(std::string_view toml, const std::string& file);
+
+}  // namespace wienertree::text

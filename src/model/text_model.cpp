@@ -1,0 +1,132 @@
+#include "wienertree/model/text_model.hpp"
+
+#include <cerrno>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <sstream>
+
+#include "wienertree/model/text/assembly.hpp"
+#include "wienertree/model/text/exact_filter.hpp"
+
+namespace wienertree {
+
+struct TextModel::Contents {
+  text::ModelSource source;
+  std::vector<double> parameters;
+  Model model;
+  std::string exact_filter_reason;
+};
+
+namespace {
+
+std::string read_file(const std::string& path) {
+  constexpr std::uintmax_t largest_model = 16U << 20U;
+  std::error_code status;
+  if (std::filesystem::is_directory(path, status))
+    throw InputError("this is a folder, not a model file", path);
+  errno = 0;
+  std::ifstream file(path, std::ios::binary);
+  if (!file) throw InputError("cannot read the model file", path, std::strerror(errno));
+  if (const auto size = std::filesystem::file_size(path, status); !status && size > largest_model)
+    throw InputError("too large for a model file", path, std::to_string(size) + " bytes");
+  std::ostringstream contents;
+  contents << file.rdbuf();
+  if (file.bad()) throw InputError("cannot read the model file", path, std::strerror(errno));
+  return contents.str();
+}
+
+std::vector<std::string> printed(const std::vector<text::Expression>& list) {
+  std::vector<std::string> result;
+  for (text::Expression e : list) result.push_back(print(e));
+  return result;
+}
+
+std::vector<std::vector<std::string>> printed(const std::vector<std::vector<text::Expression>>& lists) {
+  std::vector<std::vector<std::string>> result;
+  for (const auto& list : lists) result.push_back(printed(list));
+  return result;
+}
+
+}  // namespace
+
+TextModel TextModel::load(const std::string& path, const ParameterOverrides& overrides) {
+  return parse(read_file(path), path, overrides);
+}
+
+TextModel TextModel::parse(std::string_view toml, const std::string& origin,
+                           const ParameterOverrides& overrides) {
+  auto contents = std::make_shared<Contents>();
+  contents->source = text::read_model(toml, origin);
+  const text::ModelSource& source = contents->source;
+  contents->parameters = text::parameter_values(source, overrides);
+  const text::SymbolicModel symbolic = text::derive(source, false);
+  text::Arena arena;
+  const text::FieldExpressions bound =
+      text::substitute(symbolic.coefficients, source, contents->parameters, arena);
+  contents->model = text::assemble(source, bound, contents->parameters);
+  const text::ExactFilterAnswer exact = text::exact_filter({bound, source, contents->model});
+  contents->model.exact_filter = exact.filter;
+  contents->model.benes = exact.benes;
+  contents->exact_filter_reason = exact.reason;
+  check(contents->model);
+  return TextModel(std::move(contents));
+}
+
+const Model& TextModel::model() const { return contents_->model; }
+
+ModelAnalysis TextModel::analysis() const {
+  const Model& model = contents_->model;
+  const text::SymbolicModel symbolic = text::derive(contents_->source, true);
+  const text::FieldExpressions& c = symbolic.coefficients;
+  ModelAnalysis result;
+  result.name = model.name;
+  result.convention = contents_->source.convention == text::Convention::ito ? "ito" : "stratonovich";
+  result.states = model.state_names;
+  result.has_clock = model.has_clock;
+  result.parameters = model.parameters;
+  result.ito_drift = printed(c.ito_drift);
+  result.fields = printed(c.fields);
+  result.jacobians = printed(c.jacobians);
+  for (const text::Bracket& bracket : symbolic.brackets)
+    result.brackets.push_back({bracket.i, bracket.j, printed(bracket.components)});
+  result.sensor = printed(c.sensor);
+  result.sensor_derivative = printed(c.sensor_derivative);
+  if (c.log_likelihood) result.log_likelihood = print(*c.log_likelihood);
+  result.affine_fields = model.fields->affine_fields() != nullptr;
+  result.affine_sensor = model.fields->affine_sensor() != nullptr;
+  result.has_exact_flow = model.fields->has_exact_flow();
+  result.exact_filter = model.exact_filter;
+  result.exact_filter_name = text::name(model.exact_filter);
+  result.exact_filter_reason = contents_->exact_filter_reason;
+  return result;
+}
+
+BatchFunction TextModel::compile(std::string_view expression, const std::string& where) const {
+  const text::SourceExpression source{std::string(expression), {where, 1, 1, ""}, true};
+  text::Arena arena;
+  const text::Expression e = text::state_expression(source, contents_->source, contents_->model.has_clock,
+                                                    contents_->parameters, arena);
+  const std::size_t d = contents_->model.state_dimension();
+  TapeBuilder builder(d, 0);
+  text::TapeSymbols symbols;
+  for (std::size_t i = 0; i < d; ++i) symbols.states.push_back(builder.input(i));
+  const TapeBuilder::Value output = text::emit(e, symbols, builder);
+  return [tape = builder.finish(std::span(&output, 1))](ConstBatchView x, std::span<double> out) {
+    thread_local std::vector<const double*> inputs;
+    inputs.clear();
+    for (std::size_t i = 0; i < x.components(); ++i) inputs.push_back(x.component(i).data());
+    double* const outputs = out.data();
+    tape.evaluate(inputs, {}, std::span(&outputs, 1), x.nodes());
+  };
+}
+
+Model load_model(const std::string& path, const ParameterOverrides& overrides) {
+  return TextModel::load(path, overrides).model();
+}
+
+Model parse_model(std::string_view toml, const std::string& origin, const ParameterOverrides& overrides) {
+  return TextModel::parse(toml, origin, overrides).model();
+}
+
+}  // namespace wienertree

@@ -1,0 +1,75 @@
+#pragma once
+/// Models as text: a TOML file with the coefficients as expressions.
+///
+/// An expression is made of + - * / ^, parentheses, numbers, pi, parameters, state names, the time t and the
+/// functions exp log sqrt sin cos tan sinh cosh tanh atan erf abs min max. ^ is right associative and binds
+/// tighter than a sign: -x^2 = -(x^2). The drift is given in the Ito or the Stratonovich sense, and the other
+/// one derived.
+#include <memory>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "wienertree/model/batch_function.hpp"
+#include "wienertree/model/model.hpp"
+
+namespace wienertree {
+
+/// Values that replace parameters of a file: (name, value).
+using ParameterOverrides = std::vector<std::pair<std::string, double>>;
+
+/// What can be said about a model from its coefficients. Expressions are in the syntax of the file (with sign
+/// and step where abs, min and max were differentiated), parameters as symbols; components in the order of
+/// `states`.
+struct ModelAnalysis {
+  struct Bracket {
+    std::size_t i, j;                     ///< of [V_i, V_j], i < j
+    std::vector<std::string> components;  ///< d
+  };
+  std::string name;
+  std::string convention;           ///< in which the drift was given: "ito", "stratonovich"
+  std::vector<std::string> states;  ///< d names, the last one "t" when `has_clock`
+  bool has_clock = false;
+  std::vector<std::pair<std::string, double>> parameters;  ///< after overrides
+  std::vector<std::string> ito_drift;                      ///< V~_0, d
+  std::vector<std::vector<std::string>> fields;            ///< V_0 (Stratonovich), V_1 .. V_p, d each
+  std::vector<std::vector<std::string>> jacobians;         ///< of V_0 .. V_p; entry i*d + l is dV^i/dx_l
+  std::vector<Bracket> brackets;                           ///< [V_i, V_j] = (DV_j) V_i - (DV_i) V_j
+  std::vector<std::string> sensor;                         ///< h, k
+  std::vector<std::string> sensor_derivative;              ///< entry i*p + r-1 is V_r h_i
+  std::string log_likelihood;                              ///< empty when the model has none
+  bool affine_fields = false, affine_sensor = false, has_exact_flow = false;
+  ExactFilter exact_filter = ExactFilter::none;
+  std::string exact_filter_name;    ///< "benes", "kalman-bucy", "kalman", "none"
+  std::string exact_filter_reason;  ///< why it applies, or why none does
+};
+
+/// A model together with the text it was made from.
+class TextModel {
+ public:
+  /// @throws InputError naming file, line, column and key
+  static TextModel load(const std::string& path, const ParameterOverrides& overrides = {});
+  /// origin: the name that errors give to the text
+  static TextModel parse(std::string_view toml, const std::string& origin,
+                         const ParameterOverrides& overrides = {});
+
+  const Model& model() const;
+  ModelAnalysis analysis() const;
+  /// An expression of parameters and states (and t, when the model depends on it) as a function over batches
+  /// of states.   where: how errors call it, e.g. "--payoff".
+  /// @throws InputError with the column of the offending symbol
+  BatchFunction compile(std::string_view expression, const std::string& where) const;
+
+ private:
+  struct Contents;
+  explicit TextModel(std::shared_ptr<const Contents> contents) : contents_(std::move(contents)) {}
+  std::shared_ptr<const Contents> contents_;
+};
+
+/// The model of a file. @throws InputError naming file, line, column and key
+Model load_model(const std::string& path, const ParameterOverrides& overrides = {});
+/// The model of a text; `origin` is the name that errors give to it.
+Model parse_model(std::string_view toml, const std::string& origin, const ParameterOverrides& overrides = {});
+
+}  // namespace wienertree
