@@ -35,6 +35,7 @@ struct NodeFailure {
   std::size_t state = 0;  ///< component at fault
   double value = 0;       ///< its last value
   FailureReason reason = FailureReason::not_finite;
+  std::string message = {};  ///< the solver's own words, empty when it had none
 };
 
 /// Work done since construction.

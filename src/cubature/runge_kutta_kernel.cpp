@@ -1,0 +1,120 @@
+// Compiled with -ffp-contract=off, so that every instruction set returns the same bits.
+#include "wienertree/cubature/runge_kutta_kernel.hpp"
+
+#include <cstring>
+
+namespace wienertree {
+namespace {
+
+// One register.
+typedef double Two __attribute__((vector_size(16)));
+typedef double Four __attribute__((vector_size(32)));
+typedef double Eight __attribute__((vector_size(64)));
+
+constexpr std::size_t group =
+    16;  // lanes computed together: independent sums hide the latency of the additions
+
+#define WIENERTREE_INLINE [[gnu::always_inline]] static inline
+
+template <class Vector>
+struct Kernel {
+  static constexpr std::size_t width = sizeof(Vector) / sizeof(double), registers = group / width;
+  struct Group {
+    Vector part[registers];
+  };
+
+  WIENERTREE_INLINE void load(const double* p, Vector& value) { std::memcpy(&value, p, sizeof value); }
+  WIENERTREE_INLINE void store(double* p, const Vector& value) { std::memcpy(p, &value, sizeof value); }
+
+  /// sum_t coefficient_t stage_t at lanes at .. at+group-1; 0 without terms.
+  WIENERTREE_INLINE void sum(std::span<const StageTerm> terms, std::size_t at, Group& out) {
+    for (std::size_t r = 0; r < registers; ++r) out.part[r] = Vector{};
+    for (const StageTerm& term : terms) {
+      const double* stage = term.stage + at;
+      const double coefficient = term.coefficient;
+      for (std::size_t r = 0; r < registers; ++r) {
+        Vector k;
+        load(stage + r * width, k);
+        out.part[r] += k * coefficient;
+      }
+    }
+  }
+
+  WIENERTREE_INLINE void combine(LaneShape shape, const double* base, const double* h,
+                                 std::span<const StageTerm> terms, double* out) {
+    for (std::size_t i = 0; i < shape.components; ++i)
+      for (std::size_t lane = 0; lane < shape.lanes; lane += group) {
+        const std::size_t at = i * shape.stride + lane;
+        Group total;
+        sum(terms, at, total);
+        for (std::size_t r = 0; r < registers; ++r) {
+          Vector x, step;
+          load(base + at + r * width, x);
+          load(h + lane + r * width, step);
+          store(out + at + r * width, x + step * total.part[r]);
+        }
+      }
+  }
+
+  WIENERTREE_INLINE void error(LaneShape shape, const double* before, const double* after,
+                               std::span<const StageTerm> terms, std::span<const StageTerm> low_terms,
+                               double relative, double absolute, double* squared) {
+    for (std::size_t lane = 0; lane < shape.lanes; lane += group) {
+      Group largest{}, poison{};
+      for (std::size_t i = 0; i < shape.components; ++i) {
+        const std::size_t at = i * shape.stride + lane;
+        Group e, e_low;
+        sum(terms, at, e);
+        sum(low_terms, at, e_low);
+        for (std::size_t r = 0; r < registers; ++r) {
+          Vector x, y;
+          load(before + at + r * width, x);
+          load(after + at + r * width, y);
+          const Vector size_x = x < 0.0 ? -x : x, size_y = y < 0.0 ? -y : y;
+          const Vector unit = 1.0 / ((size_x > size_y ? size_x : size_y) * relative + absolute);
+          const Vector high = e.part[r] * unit, low = e_low.part[r] * unit;
+          Vector square = high * high;
+          if (!low_terms.empty())
+            square = square * square / (square + low * low * 0.01 + 1e-300);  // 0 / 0 must be 0
+          largest.part[r] = square > largest.part[r] ? square : largest.part[r];
+          poison.part[r] += (square - square) + (y - y);  // 0, or NaN once anything was not finite
+        }
+      }
+      for (std::size_t r = 0; r < registers; ++r)
+        store(squared + lane + r * width, largest.part[r] + poison.part[r]);
+    }
+  }
+};
+
+#define WIENERTREE_KERNEL(name, Vector, attributes)                                                    \
+  attributes void combine_##name(LaneShape shape, const double* base, const double* h,                 \
+                                 std::span<const StageTerm> terms, double* out) {                      \
+    Kernel<Vector>::combine(shape, base, h, terms, out);                                               \
+  }                                                                                                    \
+  attributes void error_##name(LaneShape shape, const double* before, const double* after,             \
+                               std::span<const StageTerm> terms, std::span<const StageTerm> low_terms, \
+                               double relative, double absolute, double* squared) {                    \
+    Kernel<Vector>::error(shape, before, after, terms, low_terms, relative, absolute, squared);        \
+  }                                                                                                    \
+  constexpr RungeKuttaKernel kernel_##name{combine_##name, error_##name};
+
+WIENERTREE_KERNEL(portable, Two, )
+#if defined(__x86_64__)
+WIENERTREE_KERNEL(avx2, Four, [[gnu::target("avx2")]])
+WIENERTREE_KERNEL(avx512, Eight, [[gnu::target("avx512f")]])
+#endif
+
+}  // namespace
+
+const RungeKuttaKernel& runge_kutta_kernel() {
+#if defined(__x86_64__)
+  static const RungeKuttaKernel& widest = __builtin_cpu_supports("avx512f") ? kernel_avx512
+                                          : __builtin_cpu_supports("avx2")  ? kernel_avx2
+                                                                            : kernel_portable;
+  return widest;
+#else
+  return kernel_portable;
+#endif
+}
+
+}  // namespace wienertree
