@@ -73,12 +73,7 @@ CubatureFormula construct_lyons_victoir_5_1() {
 }
 
 CubatureFormula construct_ninomiya_victoir(const GaussianCubature& rule) {
-  if ((rule.weights.array() <= 0).any())
-    throw InputError("a Gaussian rule needs positive weights", rule.source,
-                     fmt::format("{}", rule.weights.minCoeff()));
-  if (const double error = max_monomial_error(rule, 5); !(error <= moment_tolerance))
-    throw InputError("the Gaussian rule is not of degree 5: a monomial is off", rule.source,
-                     fmt::format("{}", error));
+  require_degree_5(rule);
   const Eigen::Index p = rule.points.rows();
   CubatureFormula formula{
       fmt::format("ninomiya-victoir-5-{}", p),

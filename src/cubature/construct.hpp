@@ -19,8 +19,7 @@ CubatureFormula construct_lyons_victoir_5_1();
 /// point z of weight mu gives two paths of weight mu/2: half of time, then z_1 e_1, .., z_p e_p, then half of
 /// time; and the same with the e_i in reverse order. Segments of zero increment are left out, and where at
 /// most one coordinate of z is not zero the two paths coincide and are one of weight mu.
-/// @throws InputError if the rule has a weight that is not positive, or is not of degree 5 (a monomial is off
-/// by more than 1e-12)
+/// @throws InputError as require_degree_5
 CubatureFormula construct_ninomiya_victoir(const GaussianCubature& rule);
 
 /// construct_ninomiya_victoir(gaussian_cubature_5(p)). @throws InputError as gaussian_cubature_5

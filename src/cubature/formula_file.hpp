@@ -18,7 +18,7 @@ namespace wienertree {
 /// @throws InputError for what is not JSON (with line and column), a missing, unknown, repeated or wrongly
 /// typed key, and
 ///   whatever check_structure refuses; the message names file, path, segment and key
-CubatureFormula parse_formula(const std::string& json, const std::string& where);
+CubatureFormula parse_formula(const std::string& text, const std::string& where);
 
 /// parse_formula on a file. @throws InputError also if the file cannot be read
 CubatureFormula read_formula(const std::filesystem::path& file);

@@ -189,4 +189,13 @@ double max_monomial_error(const GaussianCubature& rule, int degree) {
                         Eigen::ArrayXd::Ones(rule.points.cols()));
 }
 
+void require_degree_5(const GaussianCubature& rule) {
+  if ((rule.weights.array() <= 0).any())
+    throw InputError("a Gaussian rule needs positive weights", rule.source,
+                     fmt::format("{}", rule.weights.minCoeff()));
+  if (const double error = max_monomial_error(rule, 5); !(error <= 1e-12))
+    throw InputError("the Gaussian rule is not of degree 5: a monomial is off", rule.source,
+                     fmt::format("{}", error));
+}
+
 }  // namespace wienertree

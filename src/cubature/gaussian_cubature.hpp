@@ -40,4 +40,7 @@ GaussianCubature gaussian_cubature_5(int p);
 /// is the product of the (alpha_i - 1)!! if all alpha_i are even, and 0 otherwise.
 double max_monomial_error(const GaussianCubature& rule, int degree);
 
+/// @throws InputError if a weight is not positive, or a monomial of degree <= 5 is off by more than 1e-12
+void require_degree_5(const GaussianCubature& rule);
+
 }  // namespace wienertree

@@ -16,6 +16,32 @@ std::string describe(const MomentComparison& moment) {
                      moment.value, moment.expected);
 }
 
+FormulaVerification compare_moments(const TensorSeries& mean, int stated_degree, double tolerance) {
+  const GradedWords& words = mean.words;
+  const TensorSeries expected = expected_signature(words.dimension(), words.degree());
+  FormulaVerification result;
+  result.stated_degree = stated_degree;
+  result.tolerance = tolerance;
+  bool all_hold = true;
+  for (int g = 0; g <= words.degree(); ++g) {
+    double squares = 0;
+    for (auto i = words.first(g); i < words.first(g) + words.count(g); ++i) {
+      const double value = mean.coefficients[i], target = expected.coefficients[i];
+      double error = std::abs(value - target);
+      if (std::isnan(error)) error = std::numeric_limits<double>::infinity();
+      squares += error * error;
+      all_hold = all_hold && error <= tolerance;
+      if (g > stated_degree) continue;
+      result.max_error = std::max(result.max_error, error);
+      if (error > tolerance && !result.first_failure)
+        result.first_failure = MomentComparison{words.word(i), value, target};
+    }
+    if (all_hold) result.degree = g;
+    if (g == stated_degree + 1) result.next_residual = std::sqrt(squares);
+  }
+  return result;
+}
+
 }  // namespace
 
 std::string FormulaVerification::brief() const {
@@ -51,45 +77,27 @@ void check_structure(const CubatureFormula& formula, const std::string& where) {
   }
 }
 
-FormulaVerification compare_moments(const TensorSeries& mean, int stated_degree, double tolerance) {
-  const GradedWords& words = mean.words;
-  const TensorSeries expected = expected_signature(words.dimension(), words.degree());
-  FormulaVerification result;
-  result.stated_degree = stated_degree;
-  result.tolerance = tolerance;
-  bool all_hold = true;
-  for (int g = 0; g <= words.degree(); ++g) {
-    double squares = 0;
-    for (auto i = words.first(g); i < words.first(g) + words.count(g); ++i) {
-      const double value = mean.coefficients[i], target = expected.coefficients[i];
-      double error = std::abs(value - target);
-      if (std::isnan(error)) error = std::numeric_limits<double>::infinity();
-      squares += error * error;
-      all_hold = all_hold && error <= tolerance;
-      if (g > stated_degree) continue;
-      result.max_error = std::max(result.max_error, error);
-      if (error > tolerance && !result.first_failure)
-        result.first_failure = MomentComparison{words.word(i), value, target};
-    }
-    if (all_hold) result.degree = g;
-    if (g == stated_degree + 1) result.next_residual = std::sqrt(squares);
+FormulaVerification verify_moments(int stated_degree, int dimension,
+                                   const std::function<TensorSeries(int degree)>& mean, double tolerance,
+                                   bool look_beyond) {
+  const auto too_many = [&](int degree) {
+    return GradedWords::count_up_to(dimension, degree) > GradedWords::limit;
+  };
+  int degree = stated_degree;
+  if (look_beyond && !too_many(degree + 1)) ++degree;
+  FormulaVerification result = compare_moments(mean(degree), stated_degree, tolerance);
+  while (look_beyond && result.degree == degree && !too_many(degree + 1)) {
+    ++degree;
+    result.degree = compare_moments(mean(degree), stated_degree, tolerance).degree;
   }
   return result;
 }
 
 FormulaVerification verify(const CubatureFormula& formula, double tolerance, bool look_beyond) {
   check_structure(formula, formula.name);
-  const auto too_many = [&](int degree) {
-    return GradedWords::count_up_to(formula.dimension, degree) > GradedWords::limit;
-  };
-  int degree = formula.degree;
-  if (look_beyond && !too_many(degree + 1)) ++degree;
-  FormulaVerification result = compare_moments(mean_signature(formula, degree), formula.degree, tolerance);
-  while (look_beyond && result.degree == degree && !too_many(degree + 1)) {
-    ++degree;
-    result.degree = compare_moments(mean_signature(formula, degree), formula.degree, tolerance).degree;
-  }
-  return result;
+  return verify_moments(
+      formula.degree, formula.dimension, [&](int degree) { return mean_signature(formula, degree); },
+      tolerance, look_beyond);
 }
 
 void require_holds(const FormulaVerification& verification, const std::string& where) {

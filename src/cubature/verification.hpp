@@ -1,5 +1,6 @@
 #pragma once
 /// A formula is trusted only after its moments have been computed and compared, word by word.
+#include <functional>
 #include <optional>
 #include <string>
 
@@ -50,10 +51,10 @@ void check_structure(const CubatureFormula& formula, const std::string& where);
 FormulaVerification verify(const CubatureFormula& formula, double tolerance = moment_tolerance,
                            bool look_beyond = true);
 
-/// The same comparison for any mean signature (of degree >= stated_degree); no moments beyond its degree are
-/// tried.
-FormulaVerification compare_moments(const TensorSeries& mean, int stated_degree,
-                                    double tolerance = moment_tolerance);
+/// The same for anything whose mean signature can be computed: `mean(g)` returns its moments up to degree g.
+FormulaVerification verify_moments(int stated_degree, int dimension,
+                                   const std::function<TensorSeries(int degree)>& mean, double tolerance,
+                                   bool look_beyond);
 
 /// @throws InputError at `where` with the first failing word and both values, if there is one
 void require_holds(const FormulaVerification& verification, const std::string& where);

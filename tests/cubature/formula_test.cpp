@@ -120,7 +120,8 @@ TEST_CASE("A shipped file with one digit changed is refused") {
         char& digit = changed[digits[i]];
         digit = digit == '9' ? '8' : static_cast<char>(digit + 1);
         INFO(file.filename() << " byte " << digits[i]);
-        const FormulaVerification verification = verify(parse_formula(changed, "changed"));
+        const FormulaVerification verification =
+            verify(parse_formula(changed, "changed"), moment_tolerance, false);
         REQUIRE_FALSE(verification.holds());
         const MomentComparison& moment = *verification.first_failure;
         CHECK(std::abs(moment.value - moment.expected) > moment_tolerance);
@@ -265,6 +266,8 @@ TEST_CASE("Malformed files are refused with file, place and key") {
   CHECK(message_of("[]") == "f.json: an object was expected ([])");
   CHECK(message_of("{\"paths\": []}") == "f.json: the key \"name\" is missing");
   CHECK(message_of(std::string("\xff\xfe")) == "f.json: line 1, column 1: this is not JSON");
+  CHECK(message_of(std::string(100000, '[')) == "f.json: the JSON is nested too deeply");
+  CHECK(message_of("{\"kind\": \"lie\"}") == "f.json: this is a formula of Lie polynomials, not of paths");
   CHECK_THROWS_AS(read_formula("/no/such/file.json"), InputError);
   CHECK_THROWS_AS(read_formula(shipped), InputError);  // a directory
 }
