@@ -8,6 +8,8 @@
 #define WIENERTREE_INTRINSIC(name) _mm256_##name
 #define WIENERTREE_LIBMVEC_1(name) _ZGVdN4v_##name
 #define WIENERTREE_LIBMVEC_2(name) _ZGVdN4vv_##name
+#define WIENERTREE_EXP vector_exp
+#define WIENERTREE_TANH vector_tanh
 
 namespace wienertree {
 namespace {
@@ -24,8 +26,10 @@ __m256d magnitude(__m256d a) { return _mm256_andnot_pd(_mm256_set1_pd(-0.0), a);
 }  // namespace
 }  // namespace wienertree
 
+#include "tape_exponential.inl"
+// each needs what stands before it
 #include "tape_machine_x86.inl"
-// The machine comes first.
+//
 #include "tape_kernel.inl"
 
 namespace wienertree {

@@ -8,6 +8,8 @@
 #define WIENERTREE_INTRINSIC(name) _mm512_##name
 #define WIENERTREE_LIBMVEC_1(name) _ZGVeN8v_##name
 #define WIENERTREE_LIBMVEC_2(name) _ZGVeN8vv_##name
+#define WIENERTREE_EXP vector_exp
+#define WIENERTREE_TANH vector_tanh
 
 namespace wienertree {
 namespace {
@@ -24,8 +26,10 @@ __m512d magnitude(__m512d a) { return _mm512_abs_pd(a); }
 }  // namespace
 }  // namespace wienertree
 
+#include "tape_exponential.inl"
+// each needs what stands before it
 #include "tape_machine_x86.inl"
-// The machine comes first.
+//
 #include "tape_kernel.inl"
 
 namespace wienertree {

@@ -8,6 +8,8 @@
 #define WIENERTREE_INTRINSIC(name) _mm_##name
 #define WIENERTREE_LIBMVEC_1(name) _ZGVbN2v_##name
 #define WIENERTREE_LIBMVEC_2(name) _ZGVbN2vv_##name
+#define WIENERTREE_EXP WIENERTREE_LIBMVEC_1(exp)
+#define WIENERTREE_TANH WIENERTREE_LIBMVEC_1(tanh)
 
 namespace wienertree {
 namespace {

@@ -1,7 +1,8 @@
 // What the x86-64 machine codes have in common: `Machine` for tape_kernel.inl. The including file defines
 // WIENERTREE_VECTOR (__m256d, say), WIENERTREE_INTRINSIC(name) (_mm256_name), WIENERTREE_LIBMVEC_1(name) and
 // WIENERTREE_LIBMVEC_2(name) (the functions of one and two arguments of glibc's libmvec, by their names in the x86-64
-// vector function ABI: _ZGV, instruction set, N for unmasked, width, a v for each argument), and the functions
+// vector function ABI: _ZGV, instruction set, N for unmasked, width, a v for each argument), WIENERTREE_EXP(x) and
+// WIENERTREE_TANH(x), and the functions
 //
 //   fused(a, b, c)      a b + c, in one rounding where the machine can
 //   nan_of(a, result)   a where a is NaN, else result
@@ -43,14 +44,14 @@ struct Machine {
   static Vector sign(Vector a) { return nan_of(a, positive(a) - positive(-a)); }
   static Vector step(Vector a) { return nan_of(a, positive(a)); }
   static Vector square_root(Vector a) { return WIENERTREE_INTRINSIC(sqrt_pd)(a); }
-  static Vector exponential(Vector a) { return WIENERTREE_LIBMVEC_1(exp)(a); }
+  static Vector exponential(Vector a) { return WIENERTREE_EXP(a); }
   static Vector logarithm(Vector a) { return WIENERTREE_LIBMVEC_1(log)(a); }
   static Vector sine(Vector a) { return WIENERTREE_LIBMVEC_1(sin)(a); }
   static Vector cosine(Vector a) { return WIENERTREE_LIBMVEC_1(cos)(a); }
   static Vector tangent(Vector a) { return WIENERTREE_LIBMVEC_1(tan)(a); }
   static Vector hyperbolic_sine(Vector a) { return WIENERTREE_LIBMVEC_1(sinh)(a); }
   static Vector hyperbolic_cosine(Vector a) { return WIENERTREE_LIBMVEC_1(cosh)(a); }
-  static Vector hyperbolic_tangent(Vector a) { return WIENERTREE_LIBMVEC_1(tanh)(a); }
+  static Vector hyperbolic_tangent(Vector a) { return WIENERTREE_TANH(a); }
   static Vector arctangent(Vector a) { return WIENERTREE_LIBMVEC_1(atan)(a); }
   static Vector error_function(Vector a) { return WIENERTREE_LIBMVEC_1(erf)(a); }
   static Vector error_function_complement(Vector a) { return WIENERTREE_LIBMVEC_1(erfc)(a); }
