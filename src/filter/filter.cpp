@@ -6,6 +6,9 @@
 
 #include "wienertree/filter/benes_filter.hpp"
 #include "wienertree/filter/euler_filter.hpp"
+#include "wienertree/filter/grid_filter.hpp"
+#include "wienertree/filter/kalman_bucy_filter.hpp"
+#include "wienertree/filter/kalman_filter.hpp"
 #include "wienertree/filter/klv_filter.hpp"
 
 namespace wienertree {
@@ -43,6 +46,12 @@ std::unique_ptr<Filter> make_filter(const Model& model, const FilterOptions& opt
   switch (options.method) {
     case FilterMethod::benes:
       return std::make_unique<BenesFilter>(model);
+    case FilterMethod::kalman_bucy:
+      return std::make_unique<KalmanBucyFilter>(model);
+    case FilterMethod::kalman:
+      return std::make_unique<KalmanFilter>(model);
+    case FilterMethod::grid:
+      return std::make_unique<GridFilter>(model, options);
     case FilterMethod::klv:
       check_tree_options(model, options);
       return std::make_unique<KlvFilter>(model, options);

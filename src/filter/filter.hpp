@@ -46,7 +46,7 @@ class Filter {
   FilterStatistics statistics_;
 };
 
-enum class FilterMethod { klv, full_tree, euler, benes };
+enum class FilterMethod { klv, full_tree, euler, benes, kalman_bucy, kalman, grid };
 
 /// Which weights decide where the particles go (Crisan, Ortiz-Latorre 2013, versions 1 and 2).
 enum class PruneWeights {
@@ -73,6 +73,9 @@ struct FilterOptions {
   unsigned threads = 1;
   /// An unpruned tree is refused before a step that would need more memory than this, in bytes.
   double memory_limit = 4.0e9;
+  /// Grid filter: number of cells, and the longest step in units of the density's own time scale.
+  std::size_t grid_points = 800;
+  double grid_step = 0.25;
 };
 
 /// The model is copied (its fields are shared). @throws InputError if an option does not fit the model or

@@ -33,7 +33,8 @@ KlvFilter::KlvFilter(const Model& model, const FilterOptions& options)
       thinning_(options.thinning.method == ThinningMethod::none ? nullptr : make_thinning(options.thinning)),
       grower_(model_, options_.flow, options_.tolerance, options_.formula, options_.threads),
       survivors_(first_generation(model_, options_.nodes)),
-      current_(&survivors_) {
+      current_(&survivors_),
+      child_sensor_(options_.threads) {
   if (options_.prune_weights == PruneWeights::cubature)
     survivors_.log_likelihood.assign(survivors_.size(), 0.0);
 }
@@ -90,8 +91,8 @@ void KlvFilter::handle_failures(const ObservationWindow& window) {
   if (options_.on_node_failure == OnNodeFailure::stop) {
     const NodeFailure& f = *std::min_element(failures_.begin(), failures_.end(),
                                              [](const auto& a, const auto& b) { return a.node < b.node; });
-    throw RunError(fmt::format("{} ({} node{} failed)", reason(f.reason), failures_.size(),
-                               failures_.size() == 1 ? "" : "s"),
+    throw RunError(fmt::format("{}{}{} ({} node{} failed)", reason(f.reason), f.message.empty() ? "" : ": ",
+                               f.message, failures_.size(), failures_.size() == 1 ? "" : "s"),
                    fmt::format("{}, node {}, state {}", place(window), f.node, model_.state_names[f.state]),
                    fmt::format("{}", f.value));
   }
@@ -116,23 +117,25 @@ void KlvFilter::weigh(const ObservationWindow& window) {
     return;
   }
   if (model_.observation == ObservationKind::none) return;
-  constexpr std::size_t block = 1024;  // nodes whose sensor values stay in cache
-  child_sensor_.reshape(sensor_.components(), std::min(block, parents));
-  for (std::size_t branch = 0; branch < options_.formula.paths.size(); ++branch)
-    for (std::size_t first = 0; first < parents; first += block) {
-      const std::size_t count = std::min(block, parents - first), child = branch * parents + first;
-      const std::span<double> w = {weight.data() + child, count};
-      for (std::size_t n = 0; n < count; ++n) w[n] += start_term_[first + n];
-      if (!functional_->uses_end()) continue;
-      const BatchView h1 = child_sensor_.view().nodes(0, count);
-      model_.fields->sensor(children_.states.view().nodes(child, count), h1);
-      functional_->at_end(window, sensor_.view().nodes(first, count), h1, w);
-    }
+  // Tasks are blocks of one branch each, whose sensor values stay in cache.
+  constexpr std::size_t block = 1024;
+  const std::size_t blocks = (parents + block - 1) / block;
+  for (Batch& scratch : child_sensor_) scratch.reshape(sensor_.components(), std::min(block, parents));
+  grower_.threads().for_each(
+      options_.formula.paths.size() * blocks, [&](std::size_t task, std::size_t thread) {
+        const std::size_t first = task % blocks * block, count = std::min(block, parents - first);
+        const std::size_t child = task / blocks * parents + first;
+        const std::span<double> w = {weight.data() + child, count};
+        for (std::size_t n = 0; n < count; ++n) w[n] += start_term_[first + n];
+        if (!functional_->uses_end()) return;
+        const BatchView h1 = child_sensor_[thread].view().nodes(0, count);
+        model_.fields->sensor(children_.states.view().nodes(child, count), h1);
+        functional_->at_end(window, sensor_.view().nodes(first, count), h1, w);
+      });
 }
 
 void KlvFilter::thin(const ObservationWindow& window) {
   if (!thinning_ || children_.size() <= options_.nodes) {
-    survivors_.states.reshape(children_.states.components(), children_.size());
     copy_generation(children_, survivors_);
     return;
   }

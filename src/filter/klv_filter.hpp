@@ -35,7 +35,8 @@ class KlvFilter final : public Filter {
   const Generation*
       current_;  ///< what the posterior is made of: children_, or survivors_ where they are the same
   Selection selection_;
-  Batch sensor_, derivative_, child_sensor_;
+  Batch sensor_, derivative_;
+  std::vector<Batch> child_sensor_;  ///< scratch, one a thread
   std::vector<double> start_term_, term_;
   std::vector<NodeFailure> failures_;
   double time_ = 0;

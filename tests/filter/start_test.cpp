@@ -13,7 +13,7 @@ Model with_initial_law(const Eigen::VectorXd& mean, const Eigen::MatrixXd& covar
   std::string text = "name = \"m\"\nconvention = \"ito\"\n[state]\n", drift = "[drift]\n",
               diffusion = "[diffusion]\n";
   for (Eigen::Index i = 0; i < mean.size(); ++i) {
-    const std::string x = "x" + std::to_string(i);
+    const std::string x = std::string("x").append(std::to_string(i));
     text += x + " = { initial = 0 }\n";
     drift += x + " = \"0\"\n";
     diffusion += x + " = [\"1\"]\n";

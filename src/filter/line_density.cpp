@@ -1,0 +1,134 @@
+#include "wienertree/filter/line_density.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <numeric>
+
+namespace wienertree {
+namespace {
+
+constexpr double visible = 1e-14;  // of the largest value
+// Parts of the grid: what the support covers of one laid anew; between which it may lie; how much is kept
+// free on either side; where mass may have been held up.
+constexpr double placed = 0.6, narrow = 0.35, wide = 0.8, margin = 0.06, held_up = 0.005;
+constexpr std::size_t terms = 4;  // of exp(-width^2/2 d^2/dx^2), after the first
+
+}  // namespace
+
+LineDensity::LineDensity(std::size_t cells, double lowest, double highest)
+    : lowest_(lowest), highest_(highest), values_(cells), laid_(cells) {
+  grid_.cells = cells;
+}
+
+double LineDensity::largest() const { return *std::max_element(values_.begin(), values_.end()); }
+
+double LineDensity::mass() const {
+  return grid_.width * std::accumulate(values_.begin(), values_.end(), 0.0);
+}
+
+void LineDensity::scale(double factor) {
+  for (double& v : values_) v *= factor;
+}
+
+void LineDensity::lay_around(double low, double high) {
+  const double middle = std::midpoint(low, high), half = (high - low) / 2 / placed;
+  at_lowest_ = middle - half <= lowest_;
+  at_highest_ = middle + half >= highest_;
+  grid_.lower = at_lowest_ ? lowest_ : middle - half;
+  grid_.width = ((at_highest_ ? highest_ : middle + half) - grid_.lower) / static_cast<double>(grid_.cells);
+}
+
+void LineDensity::set_gaussian(double mean, double variance) {
+  const double reach = std::sqrt(-2 * variance * std::log(visible));
+  lay_around(mean - reach, mean + reach);
+  for (std::size_t i = 0; i < grid_.cells; ++i) {
+    const double z = grid_.node(i) - mean;
+    values_[i] = std::exp(-z * z / (2 * variance)) / std::sqrt(2 * std::numbers::pi * variance);
+  }
+}
+
+void LineDensity::set_point(double x, double reach) {
+  lay_around(x - reach, x + reach);
+  std::fill(values_.begin(), values_.end(), 0.0);
+  deposit(grid_, x, values_);
+}
+
+void LineDensity::set_interpolated(const LineDensity& other, double low, double high) {
+  const LineGrid from = other.grid_;
+  lay_around(low, high);
+  interpolate(from, other.values_, grid_, laid_);
+  values_.swap(laid_);
+}
+
+LineDensity::Support LineDensity::support() const {
+  const double threshold = visible * largest();
+  const auto seen = [&](double v) { return v > threshold; };
+  const auto first = std::find_if(values_.begin(), values_.end(), seen);
+  const auto last = std::find_if(values_.rbegin(), values_.rend(), seen);
+  return {static_cast<std::size_t>(first - values_.begin()),
+          values_.size() - 1 - static_cast<std::size_t>(last - values_.rbegin())};
+}
+
+bool LineDensity::has_room(Support s, double part) const {
+  const double room = part * static_cast<double>(grid_.cells);
+  return (at_lowest_ || static_cast<double>(s.first) >= room) &&
+         (at_highest_ || static_cast<double>(grid_.cells - 1 - s.last) >= room);
+}
+
+bool LineDensity::reaches_an_end() const { return !has_room(support(), held_up); }
+
+bool LineDensity::touches_a_bound() const {
+  const Support s = support();
+  return (at_lowest_ && s.first == 0) || (at_highest_ && s.last + 1 == grid_.cells);
+}
+
+bool LineDensity::is_narrow() const {
+  const Support s = support();
+  return static_cast<double>(s.last - s.first) < narrow * static_cast<double>(grid_.cells);
+}
+
+bool LineDensity::follow_mass() {
+  const Support s = support();
+  const bool crowded = static_cast<double>(s.last - s.first) > wide * static_cast<double>(grid_.cells) &&
+                       !(at_lowest_ && at_highest_);
+  if (!is_narrow() && !crowded && has_room(s, margin)) return false;
+  const double before = mass();
+  set_interpolated(*this, grid_.node(s.first), grid_.node(s.last));
+  scale(before / mass());
+  return true;
+}
+
+void LineDensity::widen() {
+  const double middle = std::midpoint(grid_.lower, grid_.upper());
+  const double half = 0.8 * placed * (grid_.upper() - grid_.lower), before = mass();
+  set_interpolated(*this, middle - half, middle + half);
+  scale(before / mass());
+}
+
+void gaussian_sum(const LineDensity& density, std::span<double> weight, std::vector<double>& scratch) {
+  static const std::vector<double> c = central_difference(4);
+  const std::size_t n = weight.size(), m = c.size();
+  std::copy(density.values().begin(), density.values().end(), weight.begin());
+  // derivative_j = (width^2 d^2/dx^2)^j density, with m zeros on either side
+  scratch.assign(2 * (n + 2 * m), 0.0);
+  double *from = scratch.data() + m, *to = from + n + 2 * m;
+  std::copy(weight.begin(), weight.end(), from);
+  double factor = 1;  // (-1/2)^j / j!
+  for (std::size_t j = 1; j <= terms; ++j) {
+    factor *= -0.5 / static_cast<double>(j);
+    for (std::size_t i = 0; i < n; ++i) {
+      double second = 0;
+      for (std::size_t k = 1; k <= m; ++k)
+        second += 2 * c[k - 1] / static_cast<double>(k) * (from[i + k] - 2 * from[i] + *(from + i - k));
+      to[i] = second;
+      weight[i] += factor * second;
+    }
+    std::swap(from, to);
+  }
+  double total = 0;
+  for (double& w : weight) total += w = std::max(w, 0.0);
+  for (double& w : weight) w /= total;
+}
+
+}  // namespace wienertree
