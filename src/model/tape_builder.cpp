@@ -100,7 +100,8 @@ TapeBuilder::Value TapeBuilder::difference(Value a, Value b) {
 }
 
 TapeBuilder::Value TapeBuilder::product(Value a, Value b) {
-  // A shared factor stands second, a constant more so; the rest in the order in which they were made, latest first.
+  // A shared factor stands second, a constant more so; the rest in the order in which they were made, latest
+  // first.
   const auto rank = [&](Value v) { return std::tuple(is_constant(v), at(v).shared, nodes_.size() - v); };
   if (rank(a) > rank(b)) std::swap(a, b);
   if (is_constant(b, 0.0)) return b;
