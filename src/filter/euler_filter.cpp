@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "wienertree/filter/initial.hpp"
+#include "wienertree/tree/initial.hpp"
 #include "wienertree/filter/places.hpp"
 
 namespace wienertree {

@@ -10,6 +10,7 @@
 #include "wienertree/filter/kalman_bucy_filter.hpp"
 #include "wienertree/filter/kalman_filter.hpp"
 #include "wienertree/filter/klv_filter.hpp"
+#include "wienertree/tree/tree_size.hpp"
 
 namespace wienertree {
 namespace {
@@ -21,11 +22,7 @@ void check_node_options(const FilterOptions& options) {
 
 void check_tree_options(const Model& model, const FilterOptions& options) {
   check_node_options(options);
-  if (options.formula.paths.empty() || options.formula.dimension != static_cast<int>(model.noise_dimension()))
-    throw InputError(
-        fmt::format("the model has {} Brownian motion{}, the cubature formula {}", model.noise_dimension(),
-                    model.noise_dimension() == 1 ? "" : "s", options.formula.dimension),
-        "formula " + options.formula.name);
+  check_formula_fits(options.formula, model);
   if (!(options.memory_limit > 0))
     throw InputError("must be positive", "memory limit", fmt::format("{}", options.memory_limit));
 }
@@ -68,29 +65,10 @@ std::unique_ptr<Filter> make_filter(const Model& model, const FilterOptions& opt
   throw InputError("unknown filter", "method");
 }
 
-UnprunedSize unpruned_size(const CubatureFormula& formula, std::size_t d, std::size_t k, std::size_t steps) {
-  const double leaves = std::pow(static_cast<double>(formula.paths.size()), static_cast<double>(steps));
-  // Both generations with states, weight, parent, branch, and the normalised weights of one of them.
-  const double bytes_a_node =
-      2.0 * (8.0 * static_cast<double>(d) + 8 + 8 + 4 + 2) + 8 + 8 * static_cast<double>(k);
-  return {leaves, leaves * bytes_a_node};
-}
-
 void refuse_oversized_tree(const Model& model, const FilterOptions& options, std::size_t steps) {
-  const bool unpruned =
-      options.method == FilterMethod::full_tree ||
-      (options.method == FilterMethod::klv && options.thinning.method == ThinningMethod::none);
-  if (!unpruned) return;
-  const auto size =
-      unpruned_size(options.formula, model.state_dimension(), model.observation_dimension(), steps);
-  if (size.bytes <= options.memory_limit) return;
-  throw InputError(
-      fmt::format("the unpruned tree of {} steps has {}^{} = {:.3g} leaves and needs about {:.3g} GB, over "
-                  "the limit of "
-                  "{:.3g} GB: thin it (--method klv --thin tbba --nodes N) or take fewer steps (--steps)",
-                  steps, options.formula.paths.size(), steps, size.leaves, size.bytes / 1e9,
-                  options.memory_limit / 1e9),
-      "full-tree");
+  if (options.method == FilterMethod::full_tree ||
+      (options.method == FilterMethod::klv && options.thinning.method == ThinningMethod::none))
+    refuse_oversized_tree(options.formula, model, steps, options.memory_limit);
 }
 
 void run(Filter& filter, const ObservationWindows& windows,

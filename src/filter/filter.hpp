@@ -82,13 +82,6 @@ struct FilterOptions {
 /// another option
 std::unique_ptr<Filter> make_filter(const Model& model, const FilterOptions& options);
 
-/// Bytes that `steps` steps of an unpruned tree need for their last two generations, and the number of leaves
-/// c^steps.
-struct UnprunedSize {
-  double leaves, bytes;
-};
-UnprunedSize unpruned_size(const CubatureFormula& formula, std::size_t state_dimension,
-                           std::size_t observation_dimension, std::size_t steps);
 /// @throws InputError with the tree's size and the options that avoid it, if it exceeds options.memory_limit
 void refuse_oversized_tree(const Model& model, const FilterOptions& options, std::size_t steps);
 

@@ -6,25 +6,11 @@
 #include <cmath>
 #include <limits>
 
-#include "wienertree/filter/initial.hpp"
 #include "wienertree/filter/places.hpp"
+#include "wienertree/tree/initial.hpp"
+#include "wienertree/tree/tree_size.hpp"
 
 namespace wienertree {
-namespace {
-
-std::string_view reason(FailureReason r) {
-  switch (r) {
-    case FailureReason::not_finite:
-      return "the node's state is not finite";
-    case FailureReason::tolerance_not_reached:
-      return "the node's ODE could not be solved to tolerance";
-    case FailureReason::left_bounds:
-      return "the node left the state's bounds";
-  }
-  return "";
-}
-
-}  // namespace
 
 KlvFilter::KlvFilter(const Model& model, const FilterOptions& options)
     : model_(model),
@@ -88,14 +74,7 @@ void KlvFilter::grow(const ObservationWindow& window) {
 }
 
 void KlvFilter::handle_failures(const ObservationWindow& window) {
-  if (options_.on_node_failure == OnNodeFailure::stop) {
-    const NodeFailure& f = *std::min_element(failures_.begin(), failures_.end(),
-                                             [](const auto& a, const auto& b) { return a.node < b.node; });
-    throw RunError(fmt::format("{}{}{} ({} node{} failed)", reason(f.reason), f.message.empty() ? "" : ": ",
-                               f.message, failures_.size(), failures_.size() == 1 ? "" : "s"),
-                   fmt::format("{}, node {}, state {}", place(window), f.node, model_.state_names[f.state]),
-                   fmt::format("{}", f.value));
-  }
+  if (options_.on_node_failure == OnNodeFailure::stop) throw_node_failure(failures_, model_, place(window));
   for (const NodeFailure& f : failures_) {
     // A dropped node has no mass; its state is its parent's, so that nothing downstream meets a NaN.
     children_.log_weight[f.node] = -std::numeric_limits<double>::infinity();

@@ -6,7 +6,7 @@
 #include <cmath>
 #include <limits>
 
-#include "wienertree/filter/initial.hpp"
+#include "wienertree/tree/initial.hpp"
 #include "wienertree/tree/random.hpp"
 
 namespace wienertree {

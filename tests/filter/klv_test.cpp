@@ -248,7 +248,7 @@ TEST_CASE("options that do not fit are refused") {
   CHECK_THROWS_AS(make_filter(model, o), InputError);
   o.threads = 1;
   o.method = FilterMethod::full_tree;
-  CHECK_THROWS_WITH(refuse_oversized_tree(model, o, 200), Catch::Contains("--thin tbba"));
+  CHECK_THROWS_WITH(refuse_oversized_tree(model, o, 200), Catch::Contains("--thin recombination"));
   CHECK_NOTHROW(refuse_oversized_tree(model, o, 10));
   o.method = FilterMethod::benes;
   CHECK_THROWS_AS(make_filter(parse_model(two_dimensional, "two.toml", {}), o), InputError);

@@ -3,7 +3,7 @@
 #include <cmath>
 
 #include "filter/text_problems.hpp"
-#include "wienertree/filter/initial.hpp"
+#include "wienertree/tree/initial.hpp"
 
 using namespace wienertree;
 

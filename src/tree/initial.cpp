@@ -1,4 +1,4 @@
-#include "wienertree/filter/initial.hpp"
+#include "wienertree/tree/initial.hpp"
 
 #include <fmt/format.h>
 
