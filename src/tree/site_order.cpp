@@ -12,8 +12,7 @@
 namespace wienertree {
 namespace {
 
-constexpr std::size_t sample_size = 1024;
-constexpr std::size_t tail = sample_size / 64;
+constexpr std::size_t least_sample = 64, largest_sample = 1024;
 
 // Appends every site of finite log-weight that `site_at` names, without branching.
 template <class SiteAt>
@@ -82,9 +81,10 @@ void SiteOrdering::spatial(const Sites& sites, const ParticleMasses& masses,
 
 // Sites at equal steps of mass: a sample of the weighted measure.
 void SiteOrdering::draw_sample(const ParticleMasses& masses) {
-  const std::uint64_t step = (masses.particles << masses.fraction_bits) / sample_size;
+  const std::size_t size = std::clamp(masses.mass.size() / 4, least_sample, largest_sample);
+  const std::uint64_t step = (masses.particles << masses.fraction_bits) / size;
   sample_.clear();
-  sample_.reserve(sample_size + 1);
+  sample_.reserve(size + 1);
   std::uint64_t below = 0, next = step / 2;
   for (std::size_t i = 0; i < masses.mass.size(); ++i) {
     below += masses.mass[i];
@@ -117,6 +117,7 @@ bool SiteOrdering::make_axis(const Sites& sites, std::span<const std::uint32_t> 
     std::nth_element(sample_values_.begin(), at, sample_values_.end());
     return 0.25 * *at;  // quarters: differences do not overflow
   };
+  const std::size_t tail = sample_values_.size() / 64;
   double low = quantile(tail), high = quantile(sample_values_.size() - 1 - tail);
   const double width = high - low;
   if (width > 0) {

@@ -48,8 +48,10 @@ void tbba(std::span<const std::uint64_t> mass, int fraction_bits, const RandomSt
 
 /// Iterated form, one level of a tree: child j of parent i, of mass lambda_j times the parent's, stands at
 /// j * parents + i. A parent's particles are shared among its children by TBBA with the parent's mass as root
-/// mass; families are independent given the parents. Applied level by level this has the law of the flat form
-/// over the leaves, and nodes without particles need never be made.
+/// mass; families are independent given the parents, and nodes without particles need never be made. Level by
+/// level the leaves' counts have each the law they have in the flat form. Jointly they do so if N = 1 or the
+/// families are owed whole numbers, not in general: here every inner node, too, receives [N g] or [N g] + 1
+/// particles, while the flat form promises that of leaves and of the sets of first leaves alone.
 ///
 /// Below one particle only ratios of masses within the family matter (one child gets the particle), so masses
 /// under 1/2 are doubled until they are not: trees of any depth keep all bits.
