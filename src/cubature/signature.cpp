@@ -8,21 +8,6 @@ namespace {
 
 using Index = GradedWords::Index;
 
-// The only splitting into blocks "0" and "ii" is found from the left: a letter i > 0 must open an "ii".
-double expected_coefficient(const Word& word) {
-  double value = 1;
-  int blocks = 0;
-  for (std::size_t i = 0; i < word.size(); ++i) {
-    if (word[i] != 0) {
-      if (i + 1 == word.size() || word[i + 1] != word[i]) return 0;
-      value /= 2;
-      ++i;
-    }
-    value /= ++blocks;
-  }
-  return value;
-}
-
 void set_to_one(TensorSeries& S) {
   S.coefficients.setZero();
   S.coefficients[0] = 1;
@@ -40,7 +25,22 @@ void set_to_signature(const CubaturePath& path, TensorSeries& S, Eigen::VectorXd
 
 TensorSeries expected_signature(int p, int degree) {
   TensorSeries E(p, degree);
-  for (Index i = 0; i < E.words.size(); ++i) E.coefficients[i] = expected_coefficient(E.words.word(i));
+  set_to_one(E);
+  // exp(G) = 1 + G (1 + G/2 (1 + G/3 (..))) for G = e_0 + 1/2 sum_i e_i (x) e_i, which raises degrees by two:
+  // in place, degrees descending. The words iiv with ||v|| = g - 2 are those that begin with i among the v'
+  // of the words iv', ||v'|| = g - 1.
+  const GradedWords& words = E.words;
+  for (int k = degree / 2; k >= 1; --k) {
+    for (int g = degree - 2 * (k - 1); g >= 2; --g) {
+      const Index rest = words.count(g - 2);
+      const Eigen::VectorXd tail = E.coefficients.segment(words.first(g - 2), rest) / k;
+      E.coefficients.segment(words.first_with(0, g), rest) = tail;
+      for (int i = 1; i <= p; ++i) {
+        const Index within = words.first_with(i, g - 1) - words.first(g - 1);
+        E.coefficients.segment(words.first_with(i, g) + within, rest) = tail / 2;
+      }
+    }
+  }
   return E;
 }
 

@@ -24,9 +24,9 @@ struct TensorSeries {
   double& operator[](std::span<const int> word) { return coefficients[words.index(word)]; }
 };
 
-/// Expected Stratonovich signature of (t, B) on [0,1]: exp(e_0 + 1/2 sum_i e_i (x) e_i) (Lyons, Victoir 2004,
-/// Proc. R. Soc. Lond. A 460, Proposition 4.10). If alpha splits into r consecutive blocks, each "0" or "ii",
-/// its coefficient is 2^{-(number of ii blocks)} / r!; otherwise 0.
+/// Expected Stratonovich signature of (t, B) on [0,1]: exp(e_0 + 1/2 sum_i e_i (x) e_i) (Fawcett 2003,
+/// thesis, Oxford; Lyons, Victoir 2004, Proc. R. Soc. Lond. A 460, 169-198). If alpha splits into r
+/// consecutive blocks, each "0" or "ii", its coefficient is 2^{-(number of ii blocks)} / r!; otherwise 0.
 /// @throws InputError as GradedWords
 TensorSeries expected_signature(int p, int degree);
 

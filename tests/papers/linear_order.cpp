@@ -21,6 +21,7 @@
 
 #include "wienertree/cubature/catalogue.hpp"
 #include "wienertree/cubature/construct.hpp"
+#include "wienertree/cubature/lie_formula.hpp"
 
 using namespace wienertree;
 using Matrix = Eigen::Matrix4d;
@@ -57,7 +58,26 @@ Matrix step_matrix(const CubatureFormula& formula, const std::vector<Matrix>& A,
   return K;
 }
 
-Errors relative_errors(const CubatureFormula& formula) {
+// The bracket of the linear fields x -> A x, x -> B x is the linear field of (DV_B) V_A - (DV_A) V_B = BA -
+// AB.
+Matrix field_of(const LieBracket& bracket, const std::vector<Matrix>& A) {
+  if (bracket.is_letter()) return A[static_cast<std::size_t>(bracket.letter())];
+  const Matrix left = field_of(bracket.left(), A), right = field_of(bracket.right(), A);
+  return right * left - left * right;
+}
+
+Matrix step_matrix(const LieFormula& formula, const std::vector<Matrix>& A, double s) {
+  Matrix K = Matrix::Zero();
+  for (const LieElement& element : formula.elements) {
+    Matrix field = Matrix::Zero();
+    for (const LieTerm& term : element.terms)
+      field += std::pow(s, term.bracket.degree() / 2.0) * term.coefficient * field_of(term.bracket, A);
+    K += element.weight * field.exp();
+  }
+  return K;
+}
+
+Errors relative_errors(const auto& formula) {
   std::mt19937_64 engine(1);
   Errors squares{};
   for (int draw = 0; draw < draws; ++draw) {
@@ -79,10 +99,15 @@ Errors relative_errors(const CubatureFormula& formula) {
 // Over n = 2, 4, 8 the least-squares slope of log2(error) against log2(n) is half the difference of the ends.
 double order(const Errors& errors) { return std::log2(errors[1] / errors[3]) / 2; }
 
-void check_order(const CubatureFormula& formula) {
+std::size_t nodes(const CubatureFormula& formula) { return formula.paths.size(); }
+std::size_t nodes(const LieFormula& formula) { return formula.elements.size(); }
+std::size_t flows(const CubatureFormula& formula) { return total_segments(formula); }
+std::size_t flows(const LieFormula& formula) { return formula.elements.size(); }
+
+void check_order(const auto& formula) {
   const Errors e = relative_errors(formula);
   std::printf("%-28s %2d %d %4zu %5zu %9.3g  %.2e %.2e %.2e %.2e  %.3f\n", formula.name.c_str(),
-              formula.degree, formula.dimension, formula.paths.size(), total_segments(formula),
+              formula.degree, formula.dimension, nodes(formula), flows(formula),
               *verify(formula).next_residual, e[0], e[1], e[2], e[3], order(e));
   INFO(formula.name);
   CHECK(order(e) == Approx((formula.degree - 1) / 2.0).margin(0.15));
@@ -97,4 +122,5 @@ TEST_CASE("Errors on linear SDEs fall with order (m-1)/2 for every formula") {
     check_order(entry.formula);
   for (int p = 1; p <= 4; ++p) check_order(construct(3, p));
   for (const int p : {1, 5, 6}) check_order(construct_ninomiya_victoir(p));
+  for (int p = 1; p <= 4; ++p) check_order(construct_lie_5(p));
 }
