@@ -55,18 +55,25 @@ class Assembly {
     model_.bounds.push_back(bound);
   }
 
+  double start_value(const SourceExpression& expression, std::size_t i) const {
+    const double x = value(expression);
+    const StateBound& bound = model_.bounds[i];
+    if (x < bound.lower || x > bound.upper)
+      throw InputError(fmt::format("the start lies outside the bounds [{}, {}]", bound.lower, bound.upper),
+                       expression.location.text(), fmt::format("{}", x));
+    return x;
+  }
+
   void add_initial() {
     const std::size_t d = source_.states.size();
     std::vector<double> start;
     for (std::size_t i = 0; i < d; ++i) {
-      const bool mean = source_.initial && !source_.initial->mean.empty();
-      const SourceExpression& expression = mean ? source_.initial->mean[i] : *source_.states[i].initial;
-      const double x = value(expression);
-      const StateBound& bound = model_.bounds[i];
-      if (x < bound.lower || x > bound.upper)
-        throw InputError(fmt::format("the start lies outside the bounds [{}, {}]", bound.lower, bound.upper),
-                         expression.location.text(), fmt::format("{}", x));
-      start.push_back(x);
+      const auto& initial = source_.states[i].initial;
+      const bool has_mean = source_.initial && !source_.initial->mean.empty();
+      start.push_back(start_value(has_mean ? source_.initial->mean[i] : *initial, i));
+      if (has_mean && initial && start_value(*initial, i) != start.back())
+        throw InputError("the start is given twice, and differently in [initial]", initial->location.text(),
+                         fmt::format("{} and {}", start_value(*initial, i), start.back()));
     }
     if (model_.has_clock) start.push_back(0);
     model_.initial = std::move(start);
@@ -102,7 +109,8 @@ class Assembly {
     Batch x(bound_.d, 1), V(bound_.d, 1), h(bound_.sensor.size(), 1);
     for (std::size_t i = 0; i < bound_.d; ++i) x(i, 0) = model_.initial[i];
     std::vector<double> D(1 + bound_.p, 0.0);
-    for (std::size_t k = 0; k <= bound_.p; ++k) {
+    for (std::size_t j = 1; j <= bound_.p + 1; ++j) {  // V_0 last: it inherits what the others have
+      const std::size_t k = j % (bound_.p + 1);
       D[k] = 1;
       model_.fields->direct(x, D, V);
       D[k] = 0;
@@ -118,7 +126,7 @@ class Assembly {
   static void require_finite(double value, const SourceExpression& place) {
     if (!std::isfinite(value))
       throw InputError("not finite at the start (this or the Ito-Stratonovich correction)",
-                       place.location.text(), fmt::format("{}", value));
+                       place.location.text(), std::isnan(value) ? "nan" : fmt::format("{}", value));
   }
 
   void add_observation() {

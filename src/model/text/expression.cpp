@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <functional>
 #include <numbers>
+#include <unordered_map>
 #include <utility>
 
 namespace wienertree::text {
@@ -151,6 +152,18 @@ Term split(Expression term, Arena& arena) {
   if (term->is_number()) return {term->number, nullptr};
   if (term->kind != Node::Kind::product || !term->operands.front()->is_number()) return {1.0, term};
   return {term->operands.front()->number, arena.product({term->operands.begin() + 1, term->operands.end()})};
+}
+
+double size(Expression e) {
+  std::unordered_map<Expression, double> known;
+  const std::function<double(Expression)> count = [&](Expression part) {
+    if (const auto found = known.find(part); found != known.end()) return found->second;
+    double nodes = 1;
+    for (Expression operand : part->operands) nodes += count(operand);
+    known.emplace(part, nodes);
+    return nodes;
+  };
+  return count(e);
 }
 
 bool contains(Expression e, Role role) {

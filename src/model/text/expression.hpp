@@ -86,6 +86,8 @@ std::string print(Expression e);
 Expression substitute(Expression e, std::span<const double> parameters, Arena& arena,
                       const std::string& where);
 
+/// Number of nodes as a tree, equal ones counted every time; infinity when astronomical.
+double size(Expression e);
 /// Whether a symbol of this role, or this symbol, occurs.
 bool contains(Expression e, Role role);
 bool contains(Expression e, Role role, std::size_t index);

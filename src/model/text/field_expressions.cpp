@@ -41,6 +41,27 @@ auto at_place(const SourceExpression& source, F&& f) {
   }
 }
 
+// An upper bound for the number of terms after expansion, at most `limit`.
+std::size_t expanded_terms(const ex& e, std::size_t limit) {
+  if (GiNaC::is_exactly_a<GiNaC::add>(e)) {
+    std::size_t terms = 0;
+    for (const ex& term : e) terms = std::min(limit, terms + expanded_terms(term, limit));
+    return terms;
+  }
+  if (GiNaC::is_exactly_a<GiNaC::mul>(e)) {
+    std::size_t terms = 1;
+    for (const ex& factor : e) terms = std::min(limit, terms * expanded_terms(factor, limit));
+    return terms;
+  }
+  if (!GiNaC::is_exactly_a<GiNaC::power>(e)) return 1;
+  const std::size_t base = expanded_terms(e.op(0), limit);
+  if (base == 1 || !e.op(1).info(GiNaC::info_flags::posint)) return 1;
+  std::size_t terms = 1;
+  for (int i = 0; i < GiNaC::ex_to<numeric>(e.op(1)).to_int() && terms < limit; ++i)
+    terms = std::min(limit, terms * base);
+  return terms;
+}
+
 class Derivation {
  public:
   explicit Derivation(const ModelSource& source)
@@ -97,6 +118,15 @@ class Derivation {
 
   ex derivative(const ex& e, std::size_t l) const { return e.diff(symbols_.state(l)); }
 
+  // What derivatives leave often cancels when it is expanded: the shorter of the two forms.
+  ex simpler(const ex& e) {
+    constexpr std::size_t most_terms = 200;
+    if (expanded_terms(e, most_terms) >= most_terms) return e;
+    const ex expanded = e.expand();
+    Conversion convert(symbols_, *result_.arena);
+    return size(convert(expanded)) < size(convert(e)) ? expanded : e;
+  }
+
   void derive_fields() {
     // 1/2 sum_{j,l} V_j^l dV_j^i/dx_l
     exvector correction(d_);
@@ -107,6 +137,8 @@ class Derivation {
             correction[i] += at_place(source_of(j + 1, i), [&]() -> ex {
               return diffusion_[j][l] * derivative(diffusion_[j][i], l) * numeric(1, 2);
             });
+    for (std::size_t i = 0; i < d_; ++i)
+      correction[i] = at_place(source_of(1, i), [&] { return simpler(correction[i]); });
     const bool ito = source_.convention == Convention::ito;
     exvector stratonovich(d_);
     for (std::size_t i = 0; i < d_; ++i) {
@@ -147,7 +179,7 @@ class Derivation {
       for (std::size_t r = 1; r <= p_; ++r) {
         ex along = 0;
         for (std::size_t l = 0; l < d_; ++l) along += V_[r][l] * gradient[l];
-        c.sensor_derivative.push_back(converted(along, place));
+        c.sensor_derivative.push_back(converted(at_place(place, [&] { return simpler(along); }), place));
       }
     }
     if (!source_.observation.log_likelihood) return;
@@ -171,7 +203,8 @@ class Derivation {
           ex component = 0;
           for (std::size_t l = 0; l < d_; ++l)
             component += V_[i][l] * derivative(V_[j][m], l) - V_[j][l] * derivative(V_[i][m], l);
-          bracket.components.push_back(converted(component, source_of(j, m)));
+          const SourceExpression& place = source_of(j, m);
+          bracket.components.push_back(converted(at_place(place, [&] { return simpler(component); }), place));
         }
         result_.brackets.push_back(std::move(bracket));
       }
@@ -181,7 +214,7 @@ class Derivation {
     return at_place(place, [&] { return Conversion(symbols_, *result_.arena)(e); });
   }
   Expression converted_derivative(const ex& e, std::size_t l, const SourceExpression& place) {
-    return converted(at_place(place, [&] { return derivative(e, l); }), place);
+    return converted(at_place(place, [&] { return simpler(derivative(e, l)); }), place);
   }
 
   const ModelSource& source_;

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cctype>
+#include <utility>
 
 namespace wienertree::text {
 
@@ -60,11 +61,15 @@ std::string nearest(std::string_view name, const std::vector<std::string>& candi
   constexpr std::size_t longest_name = 64;  // a longer one is no slip of the pen
   if (name.empty() || name.size() > longest_name) return {};
   const std::string wanted = lower_case(name);
-  std::size_t best = std::max<std::size_t>(1, name.size() / 3) + 1;
+  // Of equally near names the one of the same length: an exchange of letters before an omission.
+  const auto length_difference = [&](const std::string& candidate) {
+    return std::max(candidate.size(), name.size()) - std::min(candidate.size(), name.size());
+  };
+  std::pair best{std::max<std::size_t>(1, name.size() / 3) + 1, std::size_t{0}};
   std::string result;
   for (const std::string& candidate : candidates) {
     if (candidate.size() > longest_name) continue;
-    const std::size_t distance = edit_distance(wanted, lower_case(candidate));
+    const std::pair distance{edit_distance(wanted, lower_case(candidate)), length_difference(candidate)};
     if (distance < best) {
       best = distance;
       result = candidate;

@@ -206,7 +206,7 @@ class Parser {
     }
     digits.erase(0, std::min(digits.find_first_not_of('0'), digits.size()));
     if (digits.empty()) return 0;
-    if (!std::isfinite(value) || value == 0) fail("number out of the range of double precision", token, text);
+    if (!std::isnormal(value)) fail("number out of the range of double precision", token, text);
     if (i < text.size()) exponent += std::strtol(text.c_str() + i + 1, nullptr, 10);
     return numeric(digits.c_str()) * numeric(10).power(numeric(exponent));
   }
