@@ -1,10 +1,11 @@
 #include "wienertree/model/text_model.hpp"
 
+#include <fmt/format.h>
+
 #include <cerrno>
 #include <cstring>
 #include <filesystem>
 #include <fstream>
-#include <sstream>
 
 #include "wienertree/model/text/assembly.hpp"
 #include "wienertree/model/text/exact_filter.hpp"
@@ -21,19 +22,22 @@ struct TextModel::Contents {
 namespace {
 
 std::string read_file(const std::string& path) {
-  constexpr std::uintmax_t largest_model = 16U << 20U;
+  constexpr std::size_t largest_model = 16U << 20U;
   std::error_code status;
   if (std::filesystem::is_directory(path, status))
     throw InputError("this is a folder, not a model file", path);
   errno = 0;
   std::ifstream file(path, std::ios::binary);
   if (!file) throw InputError("cannot read the model file", path, std::strerror(errno));
-  if (const auto size = std::filesystem::file_size(path, status); !status && size > largest_model)
-    throw InputError("too large for a model file", path, std::to_string(size) + " bytes");
-  std::ostringstream contents;
-  contents << file.rdbuf();
+  std::string contents;
+  std::vector<char> chunk(1U << 16U);
+  while (file.read(chunk.data(), static_cast<std::streamsize>(chunk.size())) || file.gcount() > 0) {
+    contents.append(chunk.data(), static_cast<std::size_t>(file.gcount()));
+    if (contents.size() > largest_model)  // a device, say
+      throw InputError("too large for a model file", path, fmt::format("more than {} bytes", largest_model));
+  }
   if (file.bad()) throw InputError("cannot read the model file", path, std::strerror(errno));
-  return contents.str();
+  return contents;
 }
 
 std::vector<std::string> printed(const std::vector<text::Expression>& list) {

@@ -364,6 +364,7 @@ TEST_CASE("errors of standalone expressions name the column") {
 TEST_CASE("files that cannot be read") {
   CHECK_THROWS_AS(load_model("/nonexistent/model.toml"), InputError);
   CHECK_THROWS_AS(load_model("/"), InputError);
+  CHECK_THROWS_AS(load_model("/dev/zero"), InputError);
   try {
     load_model("/nonexistent/model.toml");
   } catch (const InputError& error) {

@@ -1,9 +1,6 @@
-#include <cln/cln.h>
 #include <fmt/format.h>
 
-#include <cmath>
-#include <cstdlib>
-
+#include "wienertree/model/text/checked_algebra.hpp"
 #include "wienertree/model/text/function_names.hpp"
 #include "wienertree/model/text/lexer.hpp"
 #include "wienertree/model/text/symbolic.hpp"
@@ -18,24 +15,7 @@ using GiNaC::is_exactly_a;
 using GiNaC::numeric;
 
 constexpr std::size_t deepest_nesting = 200;
-constexpr int largest_exponent = 1000;
-constexpr int largest_number_bits = 8192;  // beyond this an exact number is replaced by the nearest double
-constexpr std::size_t longest_literal = 400;
 constexpr std::size_t most_observations = 1000;
-
-numeric exact(double value) { return numeric(cln::cl_N(cln::rational(cln::cl_DF(value)))); }
-
-int bits(const numeric& n) { return n.numer().int_length() + n.denom().int_length(); }
-
-// Largest numeric exponent in a power or product.
-bool exponent_too_large(const ex& e) {
-  if (is_exactly_a<GiNaC::power>(e))
-    return is_exactly_a<numeric>(e.op(1)) && GiNaC::abs(ex_to<numeric>(e.op(1))) > numeric(largest_exponent);
-  if (!is_exactly_a<GiNaC::mul>(e)) return false;
-  for (const ex& factor : e)
-    if (exponent_too_large(factor)) return true;
-  return false;
-}
 
 // "y12" -> 11; npos when `name` is not a component of y.
 std::size_t observation_index(std::string_view name) {
@@ -83,8 +63,8 @@ class Parser {
   ex algebra(const Token& token, F&& f) const {
     try {
       return f();
-    } catch (const Error&) {
-      throw;
+    } catch (const AlgebraError& error) {
+      fail(error.what(), token, error.value);
     } catch (const std::exception& error) {
       fail(std::string_view(error.what()).find("zero") != std::string_view::npos
                ? "division by zero"
@@ -124,7 +104,7 @@ class Parser {
     while (next().is('*') || next().is('/')) {
       const Token operation = take();
       const ex factor = signed_factor();
-      factors.push_back(operation.is('/') ? raised(factor, -1, operation) : factor);
+      factors.push_back(operation.is('/') ? raised_at(operation, factor, -1) : factor);
     }
     return factors.size() == 1 ? factors[0] : algebra(first, [&] { return ex(GiNaC::mul(factors)); });
   }
@@ -142,34 +122,19 @@ class Parser {
     const ex base = primary();
     if (!next().is('^')) return base;
     const Token operation = take();
-    return raised(base, signed_factor(), operation);
+    return raised_at(operation, base, signed_factor());
   }
 
-  ex raised(const ex& base, const ex& exponent, const Token& token) const {
-    if (is_exactly_a<numeric>(exponent)) {
-      const numeric& n = ex_to<numeric>(exponent);
-      const bool large = GiNaC::abs(n) > numeric(largest_exponent);
-      if (is_exactly_a<numeric>(base)) {
-        const numeric& b = ex_to<numeric>(base);
-        if (b.is_negative() && !n.is_integer()) fail("power of a negative number is not real", token);
-        if (b.is_zero() && n.is_negative()) fail("division by zero", token);
-        const double value = std::pow(b.to_double(), n.to_double());
-        if (!std::isfinite(value)) fail("power is not finite", token, fmt::format("{}", value));
-        if (large || (n.is_integer() && bits(b) * std::abs(n.to_int()) > largest_number_bits))
-          return exact(value);
-      } else if (large) {
-        fail(fmt::format("exponent larger than {}", largest_exponent), token,
-             fmt::format("{}", n.to_double()));
-      }
-    }
-    const ex result = algebra(token, [&] { return GiNaC::power(base, exponent).eval(); });
-    if (exponent_too_large(result)) fail(fmt::format("exponent larger than {}", largest_exponent), token);
-    return result;
+  ex raised_at(const Token& operation, const ex& base, const ex& exponent) const {
+    return algebra(operation, [&] { return raised(base, exponent); });
   }
 
   ex primary() {
     const Token token = next();
-    if (token.kind == Token::Kind::number) return literal(take());
+    if (token.kind == Token::Kind::number) {
+      take();
+      return algebra(token, [&] { return exact_number(token.text); });
+    }
     if (token.kind == Token::Kind::name) {
       take();
       return next().is('(') ? call(token) : named(token);
@@ -185,30 +150,6 @@ class Parser {
     if (next().kind == Token::Kind::end) fail("missing ')' for this '('", opening);
     if (!next().is(')')) fail_unexpected();
     take();
-  }
-
-  // Decimal numbers are kept exactly, as fractions, so that what cancels on paper cancels here.
-  ex literal(const Token& token) const {
-    const std::string text(token.text);
-    if (text.size() > longest_literal)
-      fail(fmt::format("number of more than {} digits", longest_literal), token);
-    const double value = std::strtod(text.c_str(), nullptr);
-    std::string digits;
-    long exponent = 0;
-    std::size_t i = 0;
-    for (bool fraction = false; i < text.size() && text[i] != 'e' && text[i] != 'E'; ++i) {
-      if (text[i] == '.') {
-        fraction = true;
-        continue;
-      }
-      digits += text[i];
-      if (fraction) --exponent;
-    }
-    digits.erase(0, std::min(digits.find_first_not_of('0'), digits.size()));
-    if (digits.empty()) return 0;
-    if (!std::isnormal(value)) fail("number out of the range of double precision", token, text);
-    if (i < text.size()) exponent += std::strtol(text.c_str() + i + 1, nullptr, 10);
-    return numeric(digits.c_str()) * numeric(10).power(numeric(exponent));
   }
 
   ex call(const Token& name) {
@@ -236,18 +177,7 @@ class Parser {
       fail(fmt::format("{} takes {} argument{}, not {}", function->name, function->arguments,
                        function->arguments == 1 ? "" : "s", arguments.size()),
            name);
-    return applied(*function, arguments, name);
-  }
-
-  ex applied(const FunctionName& function, const std::vector<ex>& arguments, const Token& name) const {
-    if (is_exactly_a<numeric>(arguments[0])) {
-      const numeric& x = ex_to<numeric>(arguments[0]);
-      if (function.op == Op::logarithm && !x.is_positive())
-        fail("log of a number that is not positive", name, fmt::format("{}", x.to_double()));
-      if (function.op == Op::square_root && x.is_negative())
-        fail("sqrt of a negative number", name, fmt::format("{}", x.to_double()));
-    }
-    return algebra(name, [&] { return apply_symbolically(function.op, arguments); });
+    return algebra(name, [&] { return applied(function->op, arguments); });
   }
 
   bool is_declared(std::string_view name) const {

@@ -1,0 +1,207 @@
+#include <algorithm>
+
+#include "wienertree/model/text/field_expressions.hpp"
+#include "wienertree/model/text/parse_in_place.hpp"
+
+namespace wienertree::text {
+
+namespace {
+
+using GiNaC::ex;
+using GiNaC::exvector;
+using GiNaC::numeric;
+
+// An upper bound for the number of terms after expansion, at most `limit`.
+std::size_t expanded_terms(const ex& e, std::size_t limit) {
+  if (GiNaC::is_exactly_a<GiNaC::add>(e)) {
+    std::size_t terms = 0;
+    for (const ex& term : e) terms = std::min(limit, terms + expanded_terms(term, limit));
+    return terms;
+  }
+  if (GiNaC::is_exactly_a<GiNaC::mul>(e)) {
+    std::size_t terms = 1;
+    for (const ex& factor : e) terms = std::min(limit, terms * expanded_terms(factor, limit));
+    return terms;
+  }
+  if (!GiNaC::is_exactly_a<GiNaC::power>(e)) return 1;
+  const std::size_t base = expanded_terms(e.op(0), limit);
+  if (base == 1 || !e.op(1).info(GiNaC::info_flags::posint)) return 1;
+  std::size_t terms = 1;
+  for (int i = 0; i < GiNaC::ex_to<numeric>(e.op(1)).to_int() && terms < limit; ++i)
+    terms = std::min(limit, terms * base);
+  return terms;
+}
+
+class Derivation {
+ public:
+  explicit Derivation(const ModelSource& source)
+      : source_(source),
+        symbols_(symbols_of(source)),
+        scope_{symbols_, source.parameters.size(), true, false} {}
+
+  SymbolicModel operator()(bool with_brackets) {
+    read();
+    add_clock();
+    derive_fields();
+    result_.coefficients.d = d_;
+    result_.coefficients.p = p_;
+    convert_fields();
+    convert_sensor();
+    if (with_brackets) derive_brackets();
+    return std::move(result_);
+  }
+
+ private:
+  void read() {
+    d_ = source_.states.size();
+    p_ = source_.noise_dimension();
+    for (const SourceExpression& drift : source_.drift) given_drift_.push_back(parse(drift, scope_));
+    diffusion_.assign(p_, exvector(d_));
+    for (std::size_t i = 0; i < d_; ++i)
+      for (std::size_t j = 0; j < p_; ++j) diffusion_[j][i] = parse(source_.diffusion[i][j], scope_);
+    for (const SourceExpression& h : source_.observation.h) sensor_.push_back(parse(h, scope_));
+    if (source_.observation.log_likelihood) {
+      Scope with_observations = scope_;
+      with_observations.observations = true;
+      log_likelihood_ = parse(*source_.observation.log_likelihood, with_observations);
+    }
+  }
+
+  void add_clock() {
+    const ex t = symbols_.state(d_);
+    bool used = log_likelihood_.has(t);
+    for (const ex& e : given_drift_) used = used || e.has(t);
+    for (const exvector& V : diffusion_)
+      for (const ex& e : V) used = used || e.has(t);
+    for (const ex& e : sensor_) used = used || e.has(t);
+    result_.coefficients.has_clock = used;
+    if (!used) return;
+    given_drift_.push_back(1);
+    for (exvector& V : diffusion_) V.push_back(0);
+    ++d_;
+  }
+
+  const SourceExpression& source_of(std::size_t k, std::size_t i) const {
+    const std::size_t last = std::min(i, source_.states.size() - 1);
+    return k == 0 ? source_.drift[last] : source_.diffusion[last][k - 1];
+  }
+
+  ex derivative(const ex& e, std::size_t l) const { return e.diff(symbols_.state(l)); }
+
+  // What derivatives leave often cancels when it is expanded: the shorter of the two forms.
+  ex simpler(const ex& e) {
+    constexpr std::size_t most_terms = 200;
+    if (expanded_terms(e, most_terms) >= most_terms) return e;
+    const ex expanded = e.expand();
+    Conversion convert(symbols_, *result_.arena);
+    return size(convert(expanded)) < size(convert(e)) ? expanded : e;
+  }
+
+  void derive_fields() {
+    // 1/2 sum_{j,l} V_j^l dV_j^i/dx_l
+    exvector correction(d_);
+    for (std::size_t i = 0; i < d_; ++i)
+      for (std::size_t j = 0; j < p_; ++j)
+        for (std::size_t l = 0; l < d_; ++l)
+          if (!diffusion_[j][l].is_zero())
+            correction[i] += at_place(source_of(j + 1, i), [&]() -> ex {
+              return diffusion_[j][l] * derivative(diffusion_[j][i], l) * numeric(1, 2);
+            });
+    for (std::size_t i = 0; i < d_; ++i)
+      correction[i] = at_place(source_of(1, i), [&] { return simpler(correction[i]); });
+    const bool ito = source_.convention == Convention::ito;
+    exvector stratonovich(d_);
+    for (std::size_t i = 0; i < d_; ++i) {
+      stratonovich[i] = ito ? given_drift_[i] - correction[i] : given_drift_[i];
+      ito_drift_.push_back(ito ? given_drift_[i] : given_drift_[i] + correction[i]);
+    }
+    V_.push_back(std::move(stratonovich));
+    V_.insert(V_.end(), diffusion_.begin(), diffusion_.end());
+  }
+
+  void convert_fields() {
+    FieldExpressions& c = result_.coefficients;
+    for (std::size_t i = 0; i < d_; ++i) c.ito_drift.push_back(converted(ito_drift_[i], source_of(0, i)));
+    for (std::size_t k = 0; k <= p_; ++k) {
+      std::vector<Expression> V, jacobian;
+      for (std::size_t i = 0; i < d_; ++i) V.push_back(converted(V_[k][i], source_of(k, i)));
+      for (std::size_t i = 0; i < d_; ++i)
+        for (std::size_t l = 0; l < d_; ++l) {
+          const bool depends = contains(V[i], Role::state, l);
+          jacobian.push_back(depends ? converted_derivative(V_[k][i], l, source_of(k, i))
+                                     : result_.arena->number(0));
+        }
+      c.fields.push_back(std::move(V));
+      c.jacobians.push_back(std::move(jacobian));
+    }
+  }
+
+  void convert_sensor() {
+    FieldExpressions& c = result_.coefficients;
+    for (std::size_t i = 0; i < sensor_.size(); ++i) {
+      const SourceExpression& place = source_.observation.h[i];
+      c.sensor.push_back(converted(sensor_[i], place));
+      exvector gradient;
+      for (std::size_t l = 0; l < d_; ++l) {
+        gradient.push_back(at_place(place, [&] { return derivative(sensor_[i], l); }));
+        c.sensor_gradient.push_back(converted(gradient.back(), place));
+      }
+      for (std::size_t r = 1; r <= p_; ++r) {
+        ex along = 0;
+        for (std::size_t l = 0; l < d_; ++l) along += V_[r][l] * gradient[l];
+        c.sensor_derivative.push_back(converted(at_place(place, [&] { return simpler(along); }), place));
+      }
+    }
+    if (!source_.observation.log_likelihood) return;
+    const SourceExpression& place = *source_.observation.log_likelihood;
+    c.log_likelihood = converted(log_likelihood_, place);
+    c.observation_components = symbols_.observations();
+    if (c.observation_components == 0)
+      throw InputError("must depend on the observation, y1, y2, ..", place.location.text());
+    for (const Symbols::Entry& entry : symbols_.entries())
+      if (entry.name.size() > 1 && entry.name[0] == 'y' &&
+          entry.name.find_first_not_of("0123456789", 1) == std::string::npos)
+        throw InputError("with `log_likelihood`, y1, y2, .. are the observation; rename this",
+                         place.location.text(), entry.name);
+  }
+
+  void derive_brackets() {
+    for (std::size_t i = 0; i <= p_; ++i)
+      for (std::size_t j = i + 1; j <= p_; ++j) {
+        Bracket bracket{i, j, {}};
+        for (std::size_t m = 0; m < d_; ++m) {
+          ex component = 0;
+          for (std::size_t l = 0; l < d_; ++l)
+            component += V_[i][l] * derivative(V_[j][m], l) - V_[j][l] * derivative(V_[i][m], l);
+          const SourceExpression& place = source_of(j, m);
+          bracket.components.push_back(converted(at_place(place, [&] { return simpler(component); }), place));
+        }
+        result_.brackets.push_back(std::move(bracket));
+      }
+  }
+
+  Expression converted(const ex& e, const SourceExpression& place) {
+    return at_place(place, [&] { return Conversion(symbols_, *result_.arena)(e); });
+  }
+  Expression converted_derivative(const ex& e, std::size_t l, const SourceExpression& place) {
+    return converted(at_place(place, [&] { return simpler(derivative(e, l)); }), place);
+  }
+
+  const ModelSource& source_;
+  Symbols symbols_;
+  Scope scope_;
+  std::size_t d_ = 0, p_ = 0;
+  exvector given_drift_, ito_drift_, sensor_;
+  std::vector<exvector> diffusion_, V_;  // V_j of the source; V_0 .. V_p in Stratonovich form
+  ex log_likelihood_;
+  SymbolicModel result_{std::make_shared<Arena>(), {}, {}};
+};
+
+}  // namespace
+
+SymbolicModel derive(const ModelSource& source, bool with_brackets) {
+  const std::lock_guard lock(symbolic_mutex());
+  return Derivation(source)(with_brackets);
+}
+
+}  // namespace wienertree::text
