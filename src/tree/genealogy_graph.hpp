@@ -128,6 +128,9 @@ inline std::pair<GenealogyOutEdgeIterator, GenealogyOutEdgeIterator> out_edges(N
   return {{edge, false}, {edge, true}};
 }
 inline GenealogyIndexMap get(boost::vertex_index_t, const Genealogy& g) { return {&g}; }
+inline std::size_t get(boost::vertex_index_t, const Genealogy& g, NodeId node) {
+  return get(GenealogyIndexMap{&g}, node);
+}
 
 inline auto vertices(const Descent& d) { return vertices(*d.genealogy); }
 inline std::size_t num_vertices(const Descent& d) { return num_vertices(*d.genealogy); }
@@ -136,6 +139,9 @@ inline auto edges(const Descent& d) { return edges_of<true>(*d.genealogy); }
 inline NodeId source(const GenealogyEdge& edge, const Descent&) { return edge.source; }
 inline NodeId target(const GenealogyEdge& edge, const Descent&) { return edge.target; }
 inline GenealogyIndexMap get(boost::vertex_index_t, const Descent& d) { return {d.genealogy}; }
+inline std::size_t get(boost::vertex_index_t, const Descent& d, NodeId node) {
+  return get(GenealogyIndexMap{d.genealogy}, node);
+}
 
 }  // namespace wienertree
 

@@ -45,7 +45,8 @@ class Attribute final : public boost::dynamic_property_map {
 
 template <class Key, class Value>
 void add_attribute(boost::dynamic_properties& properties, const std::string& name, Value value) {
-  properties.insert(name, boost::make_shared<Attribute<Key, Value>>(std::move(value)));
+  properties.insert(boost::property_tree::xml_parser::encode_char_entities(name),
+                    boost::make_shared<Attribute<Key, Value>>(std::move(value)));
 }
 
 /// log of each generation's mass, where weights were kept.
