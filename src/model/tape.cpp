@@ -62,6 +62,12 @@ double apply(Op op, double a, double b) {
   return 0.0;
 }
 
+bool Tape::jumps() const {
+  return std::any_of(program_.begin(), program_.end(), [](const TapeInstruction& i) {
+    return i.code == TapeCode::sign_v || i.code == TapeCode::step_v;
+  });
+}
+
 TapeKernels tape_kernels() {
   struct Table {
     std::array<TapeKernel, 4> kernels{};

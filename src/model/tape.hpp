@@ -9,6 +9,7 @@
 /// exact value).
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <unordered_map>
 #include <vector>
@@ -57,6 +58,8 @@ class Tape {
   std::size_t uniforms() const { return uniforms_; }
   std::size_t outputs() const { return outputs_; }
   std::size_t registers() const { return registers_; }
+  /// Whether an output jumps: sign or step of something that differs from node to node.
+  bool jumps() const;
   std::size_t instructions() const { return program_.size(); }  ///< run for every block of nodes
   std::size_t uniform_instructions() const { return uniform_program_.size(); }  ///< run once per call
 
@@ -105,6 +108,8 @@ class TapeBuilder {
   Value constant(double c);
   Value unary(Op op, Value a);            ///< @pre !is_binary(op)
   Value binary(Op op, Value a, Value b);  ///< @pre is_binary(op)
+  /// The number that `v` is, if its simplification made it one.
+  std::optional<double> constant_value(Value v) const;
   /// The tape of these values, in this order; a value may occur several times.
   Tape finish(std::span<const Value> outputs) const;
 

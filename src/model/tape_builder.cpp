@@ -43,6 +43,11 @@ TapeBuilder::Value TapeBuilder::constant(double c) {
   return intern({Kind::constant, Op::add, true, 0, 0, c});
 }
 
+std::optional<double> TapeBuilder::constant_value(Value v) const {
+  assert(v < nodes_.size());
+  return is_constant(v) ? std::optional(at(v).value) : std::nullopt;
+}
+
 /// Interns an operation that admits no further simplification but that of constant operands.
 TapeBuilder::Value TapeBuilder::operation(Op op, Value a, Value b) {
   if (is_constant(a) && is_constant(b)) return constant(apply(op, at(a).value, at(b).value));
