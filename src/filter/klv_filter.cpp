@@ -143,6 +143,7 @@ const Posterior& KlvFilter::posterior() {
   posterior_.log_evidence = normalised_.log_mass;
   posterior_.points = current_->states;
   posterior_.weight = normalised_.weight;
+  posterior_.parents = current_ == &children_ ? children_.size() / options_.formula.paths.size() : 0;
   posterior_.kept = survivors_.size();
   return posterior_;
 }

@@ -15,6 +15,9 @@ struct Posterior {
   ConstBatchView points;           ///< d x N
   std::span<const double> weight;  ///< N, sum 1
   ConstBatchView covariance;       ///< d*d x N, or d*d x 1 shared by all, or no components: Dirac masses
+  /// Dirac masses that are the children of so many parents, branch after branch: node n is a child of parent
+  /// n % parents. 0 where nodes have no parents. Marginal spreads each family.
+  std::size_t parents = 0;
   std::size_t kept = 0;  ///< distinct nodes that thinning kept for the next step; N where nothing is thinned
 
   std::size_t size() const { return points.nodes(); }
@@ -26,19 +29,10 @@ struct Posterior {
 double mean(const Posterior& posterior, std::size_t i);
 /// Covariance of components i and j, computed about the mean.
 double covariance(const Posterior& posterior, std::size_t i, std::size_t j);
-/// Raw moment E[X_i^order], exact for each Gaussian.
+/// Raw moment E[X_i^order], of the nodes or exact for each Gaussian.
 double raw_moment(const Posterior& posterior, std::size_t i, int order);
 /// Effective sample size 1/sum w^2 (Kong, Liu, Wong 1994).
 double effective_sample_size(const Posterior& posterior);
-/// P(X_i <= x).
-double distribution(const Posterior& posterior, std::size_t i, double x);
-/// Density of component i at x. @pre !posterior.dirac()
-double density(const Posterior& posterior, std::size_t i, double x);
-/// Quantiles of component i for ascending `levels` in (0,1). Gaussian sums: the root of the distribution
-/// function. Dirac masses: the distribution function is taken to pass through (x_(n), w_(1) + .. + w_(n-1) +
-/// w_(n)/2) and to be linear between.
-void quantiles(const Posterior& posterior, std::size_t i, std::span<const double> levels,
-               std::span<double> out);
 
 /// The numbers reported for one time.
 struct PosteriorSummary {

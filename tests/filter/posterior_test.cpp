@@ -5,6 +5,8 @@
 #include <cmath>
 #include <numeric>
 
+#include "wienertree/filter/marginal.hpp"
+
 #include "wienertree/tree/random.hpp"
 
 using namespace wienertree;
@@ -59,7 +61,7 @@ TEST_CASE("quantiles of atoms equal those of the sorted definition") {
       const Measure m = random_atoms(N, static_cast<std::uint32_t>(N), outlier);
       const std::vector<double> levels = {0.001, 0.05, 0.5, 0.95, 0.999};
       std::vector<double> q(levels.size());
-      quantiles(m.posterior(), 0, levels, q);
+      Marginal(m.posterior(), 0).quantiles(levels, q);
       for (std::size_t i = 0; i < levels.size(); ++i) {
         INFO("N " << N << " level " << levels[i]);
         CHECK(q[i] == Approx(sorted_quantile(m, levels[i])).epsilon(1e-9));
@@ -76,18 +78,19 @@ TEST_CASE("moments, quantiles and density of a Gaussian sum agree with quadratur
   const Posterior p = m.posterior();
   double moment[5] = {}, below = 0;
   std::vector<double> q(1);
-  quantiles(p, 0, std::vector{0.3}, q);
+  const Marginal law(p, 0);
+  law.quantiles(std::vector{0.3}, q);
   // The trapezoidal rule on a smooth decaying integrand is exact to rounding at this spacing.
   const double dx = 0.005;
   for (double x = -25; x < 25; x += dx)
-    for (int k = 0; k < 5; ++k) moment[k] += dx * std::pow(x, k) * density(p, 0, x);
-  for (double x = -25 + dx / 2; x < q[0]; x += dx) below += dx * density(p, 0, x);
+    for (int k = 0; k < 5; ++k) moment[k] += dx * std::pow(x, k) * law.density(x);
+  for (double x = -25 + dx / 2; x < q[0]; x += dx) below += dx * law.density(x);
   CHECK(moment[0] == Approx(1).epsilon(1e-10));
   for (int k = 1; k < 5; ++k) CHECK(raw_moment(p, 0, k) == Approx(moment[k]).epsilon(1e-9));
   CHECK(mean(p, 0) == Approx(moment[1]));
   CHECK(covariance(p, 0, 0) == Approx(moment[2] - moment[1] * moment[1]));
   CHECK(below == Approx(0.3).margin(dx));
-  CHECK(distribution(p, 0, q[0]) == Approx(0.3).epsilon(1e-12));
+  CHECK(law.distribution(q[0]) == Approx(0.3).epsilon(1e-10));
 }
 
 TEST_CASE("a summary gathers what each function gives") {
@@ -101,4 +104,51 @@ TEST_CASE("a summary gathers what each function gives") {
   CHECK(s.moments[0].size() == 3);
   CHECK(s.moments[0][2] == raw_moment(p, 0, 4));
   CHECK((s.q05[0] < s.q50[0] && s.q50[0] < s.q95[0]));
+}
+
+TEST_CASE("families are spread: mean and variance stay, the staircase goes") {
+  // One step of degree 5 from a lattice of nodes under N(0,1): the children lie on a lattice again, spacing
+  // 0.5.
+  constexpr std::size_t parents = 41;
+  Measure m{Batch(1, 3 * parents), std::vector<double>(3 * parents), {}};
+  const double s = 0.25 / 3, jump = std::sqrt(3 * s), weights[3] = {1.0 / 6, 2.0 / 3, 1.0 / 6};
+  double sum = 0;
+  for (std::size_t j = 0; j < 3; ++j)
+    for (std::size_t n = 0; n < parents; ++n) {
+      const double x = (static_cast<double>(n) - 20) * jump;
+      m.points(0, j * parents + n) = x + (static_cast<double>(j) - 1) * jump;
+      sum += m.weight[j * parents + n] = weights[j] * std::exp(-x * x / 2);
+    }
+  for (double& w : m.weight) w /= sum;
+  Posterior p = m.posterior();
+  p.parents = parents;
+  const Marginal law(p, 0);
+  const double sd = std::sqrt(1 + s);
+  // The trapezoidal sum of Gaussians of spacing 0.5 and sd sqrt(1/12) = 0.289: ripple 2 exp(-2 pi^2
+  // (0.289/0.5)^2) = 2.8e-3 of the density.
+  for (const double x : {-2.0, -0.7, 0.1, 1.3}) {
+    const double exact = std::exp(-x * x / (2 * sd * sd)) / (sd * std::sqrt(2 * 3.14159265358979));
+    CHECK(law.density(x) == Approx(exact).epsilon(4e-3));
+    CHECK(law.distribution(x) == Approx(std::erfc(-x / sd / std::sqrt(2.0)) / 2).margin(5e-4));
+  }
+  std::vector<double> q(2);
+  law.quantiles(std::vector{0.05, 0.95}, q);
+  CHECK(q[1] == Approx(1.6448536 * sd).margin(5e-3));
+  CHECK(q[0] == Approx(-q[1]).epsilon(1e-9));
+}
+
+TEST_CASE("merging many Gaussians keeps the law") {
+  constexpr std::size_t N = 20000;
+  Measure m{Batch(1, N), std::vector<double>(N, 1.0 / N), Batch(1, 1)};
+  RandomStream{4, 0, 0, Purpose::signal_noise}.normals(0, m.points.component(0));
+  m.covariance(0, 0) = 0.01;
+  const Posterior p = m.posterior();
+  const Marginal law(p, 0);
+  for (const double x : {-1.5, 0.0, 0.8}) {
+    double exact = 0;
+    for (std::size_t n = 0; n < N; ++n)
+      exact += std::erfc((m.points(0, n) - x) / 0.1 / std::sqrt(2.0)) / 2 / N;
+    // Within a cell of width 1/32 sd the mean and variance are kept: error of third order, (1/32)^3/6.
+    CHECK(law.distribution(x) == Approx(exact).margin(1e-5));
+  }
 }

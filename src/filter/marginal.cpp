@@ -1,0 +1,178 @@
+#include "wienertree/filter/marginal.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cassert>
+#include <cmath>
+#include <numbers>
+
+namespace wienertree {
+namespace {
+
+constexpr std::size_t most_gaussians = 512;
+
+double normal_distribution(double z) { return 0.5 * std::erfc(-z / std::numbers::sqrt2); }
+
+struct Atom {
+  double x, weight;
+};
+
+// Quantiles of Dirac masses in linear time: a histogram locates the atoms around each level, and only those
+// are sorted.
+class AtomQuantiles {
+ public:
+  AtomQuantiles(std::span<const double> x, std::span<const double> weight) : x_(x), weight_(weight) {
+    const auto [low, high] = std::minmax_element(x.begin(), x.end());
+    low_ = *low;
+    scale_ = *high > *low ? static_cast<double>(buckets) / (*high - *low) : 0.0;
+    for (std::size_t n = 0; n < x.size(); ++n) mass_[bucket(x[n])] += weight[n];
+  }
+
+  double at(double level) {
+    // The bucket where the cumulated weight passes the level, with its non-empty neighbours: the midpoints
+    // that bracket the level belong to these.
+    std::size_t b = 0;
+    double before = 0;
+    while (b + 1 < buckets && before + mass_[b] < level) before += mass_[b++];
+    std::size_t first = b, last = b;
+    while (first > 0 && (first == b || mass_[first] == 0)) before -= mass_[--first];
+    while (last + 1 < buckets && (last == b || mass_[last] == 0)) ++last;
+    atoms_.clear();
+    for (std::size_t n = 0; n < x_.size(); ++n)
+      if (const std::size_t at = bucket(x_[n]); at >= first && at <= last && weight_[n] > 0)
+        atoms_.push_back({x_[n], weight_[n]});
+    std::sort(atoms_.begin(), atoms_.end(), [](const Atom& a, const Atom& b_) { return a.x < b_.x; });
+    if (atoms_.empty()) return x_[0];
+    double previous_x = atoms_.front().x, previous_level = -1;
+    for (const Atom& a : atoms_) {
+      const double middle = before + a.weight / 2;
+      if (middle >= level) {
+        if (previous_level < 0) return a.x;
+        return previous_x + (a.x - previous_x) * (level - previous_level) / (middle - previous_level);
+      }
+      previous_x = a.x;
+      previous_level = middle;
+      before += a.weight;
+    }
+    return previous_x;
+  }
+
+ private:
+  static constexpr std::size_t buckets = 1024;
+  std::size_t bucket(double x) const {
+    return std::min(buckets - 1, static_cast<std::size_t>((x - low_) * scale_));
+  }
+  std::span<const double> x_, weight_;
+  double low_ = 0, scale_ = 0;
+  std::array<double, buckets> mass_{};
+  std::vector<Atom> atoms_;
+};
+
+}  // namespace
+
+Marginal::Marginal(const Posterior& posterior, std::size_t i)
+    : atoms_(posterior.points.component(i)), weight_(posterior.weight) {
+  std::vector<Family> families;
+  if (posterior.dirac() && posterior.parents == 0) return;
+  if (posterior.dirac()) {
+    add_families(posterior.parents, families);
+  } else {
+    for (std::size_t n = 0; n < posterior.size(); ++n)
+      families.push_back({weight_[n], atoms_[n], posterior.variance_of(i, n)});
+  }
+  if (families.size() > most_gaussians) merge(families);
+  for (const Family& f : families)
+    if (f.weight > 0) gaussians_.push_back({f.weight, f.mean, std::sqrt(f.variance)});
+}
+
+// Mean and variance of each family, relative to its first child so that nothing cancels.
+void Marginal::add_families(std::size_t parents, std::vector<Family>& out) const {
+  out.assign(parents, {0, 0, 0});
+  for (std::size_t first = 0; first < atoms_.size(); first += parents)
+    for (std::size_t m = 0; m < parents; ++m) {
+      const double w = weight_[first + m], x = atoms_[first + m] - atoms_[m];
+      out[m].weight += w;
+      out[m].mean += w * x;
+      out[m].variance += w * x * x;
+    }
+  for (std::size_t m = 0; m < parents; ++m) {
+    Family& f = out[m];
+    if (!(f.weight > 0)) continue;
+    f.mean /= f.weight;
+    f.variance = std::max(0.0, f.variance / f.weight - f.mean * f.mean);
+    f.mean += atoms_[m];
+  }
+}
+
+void Marginal::merge(std::vector<Family>& families) {
+  double mean = 0, second = 0;
+  for (const Family& f : families) mean += f.weight * f.mean;
+  for (const Family& f : families) second += f.weight * (f.variance + (f.mean - mean) * (f.mean - mean));
+  const double low = mean - 8 * std::sqrt(second), width = 16 * std::sqrt(second) / most_gaussians;
+  std::vector<Family> cells(most_gaussians, {0, 0, 0});
+  for (const Family& f : families) {
+    const double position = width > 0 ? std::clamp((f.mean - low) / width, 0.0, most_gaussians - 1.0) : 0.0;
+    Family& cell = cells[static_cast<std::size_t>(position)];
+    cell.weight += f.weight;
+    cell.mean += f.weight * (f.mean - mean);
+    cell.variance += f.weight * (f.variance + (f.mean - mean) * (f.mean - mean));
+  }
+  for (Family& cell : cells) {
+    if (!(cell.weight > 0)) continue;
+    cell.mean /= cell.weight;
+    cell.variance = std::max(0.0, cell.variance / cell.weight - cell.mean * cell.mean);
+    cell.mean += mean;
+  }
+  families.swap(cells);
+}
+
+double Marginal::distribution(double x) const {
+  double sum = 0;
+  for (const Gaussian& g : gaussians_)
+    sum += g.weight * (g.sd > 0 ? normal_distribution((x - g.mean) / g.sd) : (g.mean <= x ? 1.0 : 0.0));
+  if (gaussians_.empty())
+    for (std::size_t n = 0; n < atoms_.size(); ++n) sum += atoms_[n] <= x ? weight_[n] : 0.0;
+  return sum;
+}
+
+double Marginal::density(double x) const {
+  assert(has_density());
+  double sum = 0;
+  for (const Gaussian& g : gaussians_) {
+    const double z = (x - g.mean) / g.sd;
+    sum += g.weight * std::exp(-z * z / 2) / g.sd;
+  }
+  return sum / std::sqrt(2 * std::numbers::pi);
+}
+
+double Marginal::gaussian_quantile(double level) const {
+  double low = INFINITY, high = -INFINITY;
+  for (const Gaussian& g : gaussians_) {
+    low = std::min(low, g.mean - 40 * g.sd);
+    high = std::max(high, g.mean + 40 * g.sd);
+  }
+  // Newton's step where it stays inside the bracket and there is a density, else bisection, to 1e-12 of the
+  // bracket's width.
+  double x = low + (high - low) / 2;
+  const double resolution = 1e-12 * (high - low);
+  for (int k = 0; k < 200 && high - low > resolution; ++k) {
+    const double excess = distribution(x) - level;
+    (excess < 0 ? low : high) = x;
+    const double slope = has_density() ? density(x) : 0.0;
+    const double step = slope > 0 ? excess / slope : INFINITY;
+    if (std::abs(step) < resolution) return x - step;
+    x = x - step > low && x - step < high ? x - step : low + (high - low) / 2;
+  }
+  return high;
+}
+
+void Marginal::quantiles(std::span<const double> levels, std::span<double> out) const {
+  if (!gaussians_.empty()) {
+    for (std::size_t q = 0; q < levels.size(); ++q) out[q] = gaussian_quantile(levels[q]);
+    return;
+  }
+  AtomQuantiles atoms(atoms_, weight_);
+  for (std::size_t q = 0; q < levels.size(); ++q) out[q] = atoms.at(levels[q]);
+}
+
+}  // namespace wienertree
