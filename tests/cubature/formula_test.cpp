@@ -6,6 +6,7 @@
 #include <fstream>
 #include <iterator>
 #include <limits>
+#include <random>
 
 #include "wienertree/cubature/catalogue.hpp"
 #include "wienertree/cubature/construct.hpp"
@@ -35,7 +36,8 @@ std::vector<fs::path> shipped_files() {
 struct TemporaryDirectory {
   fs::path path;
   explicit TemporaryDirectory(const std::string& name)
-      : path(fs::temp_directory_path() / ("wienertree-formula-test-" + name)) {
+      : path(fs::temp_directory_path() /
+             ("wienertree-formula-test-" + name + std::to_string(std::random_device{}()))) {
     fs::remove_all(path);
     fs::create_directories(path);
   }

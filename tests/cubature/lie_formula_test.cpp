@@ -3,6 +3,7 @@
 #include <catch2/catch.hpp>
 #include <cmath>
 #include <filesystem>
+#include <random>
 
 #include "wienertree/cubature/construct.hpp"
 #include "wienertree/cubature/formula_file.hpp"
@@ -97,7 +98,8 @@ TEST_CASE("Any x gives degree 5, any other coefficient does not") {
 
 TEST_CASE("A Lie-polynomial formula survives writing and reading bit for bit") {
   const LieFormula formula = construct_lie_5(3);
-  const auto file = std::filesystem::temp_directory_path() / "wienertree-lie-formula-test.json";
+  const auto file = std::filesystem::temp_directory_path() /
+                    ("wienertree-lie-formula-test-" + std::to_string(std::random_device{}()) + ".json");
   save_formula(formula, file);
   const LieFormula again = load_lie_formula(file);
   CHECK(format_formula(again) == format_formula(formula));
