@@ -1,7 +1,8 @@
 #include "wienertree/cubature/batch_nvector.hpp"
 
+#include <Eigen/Core>
 #include <algorithm>
-#include <array>
+#include <cassert>
 #include <cmath>
 #include <limits>
 #include <memory>
@@ -19,47 +20,51 @@ Content& content(N_Vector x) { return *static_cast<Content*>(x->content); }
 const BatchShape& shape(N_Vector x) { return *content(x).shape; }
 double* component(N_Vector x, std::size_t i) { return content(x).values.get() + i * shape(x).capacity; }
 
-/// z = f(x..), elementwise.
+/// Eight nodes. Operations run over whole octets, by SIMD registers; what they make of the lanes beyond the
+/// last node is never used.
+using Octet = Eigen::Array<double, 8, 1>;
+constexpr std::size_t octet = 8;
+
+Octet load(const double* p) { return Octet::Map(p); }
+
+/// z = f(x..), elementwise; z may be one of x.
 template <class F, class... Vectors>
 void transform(F f, N_Vector z, Vectors... x) {
   const BatchShape& s = shape(z);
   for (std::size_t i = 0; i < s.components; ++i) {
     double* out = component(z, i);
     [&](auto... in) {
-      for (std::size_t n = 0; n < s.nodes; ++n) out[n] = f(in[n]...);
+      for (std::size_t n = 0; n < s.nodes; n += octet) Octet::Map(out + n) = f(load(in + n)...);
     }(component(x, i)...);
   }
 }
 
-/// max over nodes of sqrt((1/d) sum_i term(i, n)); NaN as soon as one term is.
+/// max over nodes of sqrt((1/d) sum_i term(i, n)), `term` for eight nodes at once; NaN as soon as one is not
+/// finite.
 template <class Term>
 double worst_node(const BatchShape& s, Term term) {
-  constexpr std::size_t chunk = 64;
-  double worst = 0, poison = 0;
-  for (std::size_t first = 0; first < s.nodes; first += chunk) {
-    const std::size_t count = std::min(chunk, s.nodes - first);
-    std::array<double, chunk> sum{};
-    for (std::size_t i = 0; i < s.components; ++i)
-      for (std::size_t n = 0; n < count; ++n) sum[n] += term(i, first + n);
-    for (std::size_t n = 0; n < count; ++n) {
-      worst = std::max(worst, sum[n]);
-      poison += sum[n] - sum[n];
-    }
+  Octet worst = Octet::Zero(), poison = Octet::Zero();
+  for (std::size_t n = 0; n < s.nodes; n += octet) {
+    Octet sum = Octet::Zero();
+    for (std::size_t i = 0; i < s.components; ++i) sum += term(i, n);
+    for (std::size_t beyond = s.nodes - n; beyond < octet; ++beyond)
+      sum[static_cast<Eigen::Index>(beyond)] = 0.0;
+    worst = worst.max(sum);
+    poison += sum - sum;  // 0 or NaN
   }
-  return std::sqrt(worst / static_cast<double>(s.components)) + poison;
+  return std::sqrt(worst.maxCoeff() / static_cast<double>(s.components)) + poison.sum();
 }
 
 double norm(N_Vector x, N_Vector w) {
-  return worst_node(shape(x), [=](std::size_t i, std::size_t n) {
-    const double scaled = component(x, i)[n] * component(w, i)[n];
-    return scaled * scaled;
+  return worst_node(shape(x), [=](std::size_t i, std::size_t n) -> Octet {
+    return (load(component(x, i) + n) * load(component(w, i) + n)).square();
   });
 }
 
 double masked_norm(N_Vector x, N_Vector w, N_Vector mask) {
-  return worst_node(shape(x), [=](std::size_t i, std::size_t n) {
-    const double scaled = component(mask, i)[n] > 0 ? component(x, i)[n] * component(w, i)[n] : 0.0;
-    return scaled * scaled;
+  return worst_node(shape(x), [=](std::size_t i, std::size_t n) -> Octet {
+    const Octet scaled = load(component(x, i) + n) * load(component(w, i) + n);
+    return (load(component(mask, i) + n) > 0.0).select(scaled.square(), 0.0);
   });
 }
 
@@ -102,19 +107,27 @@ void install(_generic_N_Vector_Ops& ops) {
     return static_cast<sunindextype>(shape(x).components * shape(x).nodes);
   };
   ops.nvlinearsum = [](double a, N_Vector x, double b, N_Vector y, N_Vector z) {
-    transform([=](double u, double v) { return a * u + b * v; }, z, x, y);
+    transform([=](const Octet& u, const Octet& v) -> Octet { return a * u + b * v; }, z, x, y);
   };
-  ops.nvconst = [](double c, N_Vector z) { transform([=] { return c; }, z); };
+  ops.nvconst = [](double c, N_Vector z) { transform([=]() -> Octet { return Octet::Constant(c); }, z); };
   ops.nvprod = [](N_Vector x, N_Vector y, N_Vector z) {
-    transform([](double u, double v) { return u * v; }, z, x, y);
+    transform([](const Octet& u, const Octet& v) -> Octet { return u * v; }, z, x, y);
   };
   ops.nvdiv = [](N_Vector x, N_Vector y, N_Vector z) {
-    transform([](double u, double v) { return u / v; }, z, x, y);
+    transform([](const Octet& u, const Octet& v) -> Octet { return u / v; }, z, x, y);
   };
-  ops.nvscale = [](double c, N_Vector x, N_Vector z) { transform([=](double u) { return c * u; }, z, x); };
-  ops.nvabs = [](N_Vector x, N_Vector z) { transform([](double u) { return std::abs(u); }, z, x); };
-  ops.nvinv = [](N_Vector x, N_Vector z) { transform([](double u) { return 1 / u; }, z, x); };
-  ops.nvaddconst = [](N_Vector x, double b, N_Vector z) { transform([=](double u) { return u + b; }, z, x); };
+  ops.nvscale = [](double c, N_Vector x, N_Vector z) {
+    transform([=](const Octet& u) -> Octet { return c * u; }, z, x);
+  };
+  ops.nvabs = [](N_Vector x, N_Vector z) {
+    transform([](const Octet& u) -> Octet { return u.abs(); }, z, x);
+  };
+  ops.nvinv = [](N_Vector x, N_Vector z) {
+    transform([](const Octet& u) -> Octet { return 1.0 / u; }, z, x);
+  };
+  ops.nvaddconst = [](N_Vector x, double b, N_Vector z) {
+    transform([=](const Octet& u) -> Octet { return u + b; }, z, x);
+  };
   ops.nvmaxnorm = largest;
   ops.nvmin = smallest;
   ops.nvwrmsnorm = norm;
@@ -124,6 +137,7 @@ void install(_generic_N_Vector_Ops& ops) {
 }  // namespace
 
 N_Vector make_batch_nvector(const BatchShape& shape, SUNContext context) {
+  assert(shape.capacity % octet == 0);
   auto data = std::make_unique<Content>();
   data->shape = &shape;
   data->values = std::make_unique<double[]>(shape.components * shape.capacity);

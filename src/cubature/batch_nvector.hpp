@@ -18,7 +18,7 @@ namespace wienertree {
 /// anew.
 struct BatchShape {
   std::size_t components = 0;  ///< d
-  std::size_t capacity = 0;    ///< components lie this many doubles apart
+  std::size_t capacity = 0;    ///< components lie this many doubles apart; a multiple of 8
   std::size_t nodes = 0;       ///< at most capacity: the operations see these alone
 };
 

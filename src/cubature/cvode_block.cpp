@@ -10,11 +10,11 @@
 
 namespace wienertree {
 
-CvodeBlock::CvodeBlock(SegmentField& field, FlowTolerance tolerance, std::size_t capacity)
-    : integrator_(std::make_unique<CvodeIntegrator>(field, tolerance, capacity)),
-      start_(field.dimension(), capacity) {
-  finite_.reserve(capacity);
-  survivors_.reserve(capacity);
+CvodeBlock::CvodeBlock(SegmentField& field, FlowTolerance tolerance)
+    : integrator_(std::make_unique<CvodeIntegrator>(field, tolerance)),
+      start_(field.dimension(), flow_block) {
+  finite_.reserve(flow_block);
+  survivors_.reserve(flow_block);
 }
 
 CvodeBlock::~CvodeBlock() = default;

@@ -15,15 +15,15 @@ class CvodeIntegrator;
 /// One instance belongs to one thread.
 class CvodeBlock {
  public:
-  /// `field` must outlive the instance. `capacity`: the largest number of nodes of a call.
+  /// `field` must outlive the instance.
   /// @throws RunError if SUNDIALS cannot be set up
-  CvodeBlock(SegmentField& field, FlowTolerance tolerance, std::size_t capacity = flow_block);
+  CvodeBlock(SegmentField& field, FlowTolerance tolerance);
   ~CvodeBlock();
   CvodeBlock(const CvodeBlock&) = delete;
   CvodeBlock& operator=(const CvodeBlock&) = delete;
 
   /// Moves node n in place along the share `lengths[n]` in (0, 1] of the segment D.   x: d x N, N <=
-  /// capacity. Nodes that fail are appended to `failures`, numbered within x, and become NaN (left_bounds:
+  /// flow_block. Nodes that fail are appended to `failures`, numbered within x, and become NaN (left_bounds:
   /// stay where the integration stopped). The others move exactly as if the failed ones were not there.
   void move(std::span<const double> D, std::span<const double> lengths, BatchView x,
             std::vector<NodeFailure>& failures);

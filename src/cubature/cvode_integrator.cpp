@@ -12,7 +12,7 @@ namespace {
 /// CVODE keeps the error of a step below its tolerance. Its steps a segment are some tens, and their errors
 /// add up; a tenth of the tolerance keeps the error of the segment below the tolerance (the tests measure
 /// it).
-constexpr double share_of_tolerance = 0.1;
+constexpr double share_of_tolerance = 0.01;
 constexpr long max_steps = 20000;
 
 void require(bool condition, const char* call) {
@@ -21,12 +21,12 @@ void require(bool condition, const char* call) {
 
 }  // namespace
 
-CvodeIntegrator::CvodeIntegrator(SegmentField& field, FlowTolerance tolerance, std::size_t capacity)
+CvodeIntegrator::CvodeIntegrator(SegmentField& field, FlowTolerance tolerance)
     : field_(field),
-      shape_{field.dimension(), capacity, capacity},
-      lengths_(capacity, 1.0),
-      jacobian_(field.dimension() * field.dimension(), capacity),
-      newton_(field.dimension(), capacity) {
+      shape_{field.dimension(), flow_block, flow_block},
+      lengths_(flow_block, 1.0),
+      jacobian_(field.dimension() * field.dimension(), flow_block),
+      newton_(field.dimension(), flow_block) {
   SUNContext context = nullptr;
   require(SUNContext_Create(nullptr, &context) == 0, "SUNContext_Create");
   context_.reset(context);

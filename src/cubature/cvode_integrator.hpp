@@ -25,11 +25,11 @@ namespace wienertree {
 class CvodeIntegrator {
  public:
   /// @throws RunError if SUNDIALS cannot be set up
-  CvodeIntegrator(SegmentField& field, FlowTolerance tolerance, std::size_t capacity);
+  CvodeIntegrator(SegmentField& field, FlowTolerance tolerance);
   CvodeIntegrator(const CvodeIntegrator&) = delete;
   CvodeIntegrator& operator=(const CvodeIntegrator&) = delete;
 
-  /// Sets the number of nodes. Returns the states to be filled: d x nodes.
+  /// Sets the number of nodes, 1 to flow_block. Returns the states to be filled: d x nodes.
   BatchView prepare(std::size_t nodes);
   /// To be filled too: node n moves along the share lengths()[n] of the segment.
   std::span<double> lengths() { return {lengths_.data(), shape_.nodes}; }

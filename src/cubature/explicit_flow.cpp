@@ -52,8 +52,8 @@ class ExplicitFlow final : public Flow {
         degree_(degree),
         field_(model),
         block_(field_.dimension(), tolerance),
-        low_(cash_karp_5, block_),
-        high_(dormand_prince_8, block_),
+        low_(cash_karp_5(), block_),
+        high_(prince_dormand_8(), block_),
         first_choice_(low_, high_, degree, field_, block_),
         states_(2 * lanes * field_.dimension()),
         stiff_(field_, tolerance) {

@@ -28,7 +28,7 @@ RungeKuttaBlock::Method::Method(const RungeKuttaPair& pair, RungeKuttaBlock& blo
   for (std::size_t i = 0; i < static_cast<std::size_t>(pair.stages); ++i) append(pair.row(i));
   append(pair.b);
   append(pair.e);
-  append(pair.e_low);
+  append(pair.g);
 }
 
 void RungeKuttaBlock::attempt(const Method& method, SegmentField& field, std::span<const double> D,
@@ -47,8 +47,10 @@ void RungeKuttaBlock::attempt(const Method& method, SegmentField& field, std::sp
     field.evaluate(view(arguments_, n), D, {stage(i), dimension_, n, lanes});
   }
   kernel_.combine(shape, x, h, method.row(stages), result);
-  kernel_.error(shape, x, result, method.row(stages + 1), method.row(stages + 2), tolerance_.relative,
-                tolerance_.absolute, squared_errors_.front().value);
+  const ErrorTerms terms{method.row(stages + 1), method.row(stages + 2), stage(0), method.pair().guard_power,
+                         method.pair().guard_weight};
+  kernel_.error(shape, x, result, h, terms, tolerance_.relative, tolerance_.absolute,
+                squared_errors_.front().value);
 }
 
 }  // namespace wienertree

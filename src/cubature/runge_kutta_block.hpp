@@ -34,16 +34,16 @@ class RungeKuttaBlock {
     }
     const RungeKuttaPair* pair_;
     std::vector<StageTerm> terms_;
-    std::vector<std::size_t> begins_;  // rows 0 .. s-1 of a, then b, e, e'
+    std::vector<std::size_t> begins_;  // rows 0 .. s-1 of a, then b, e, g
   };
 
   /// Input, to be filled by the caller: states (d x n) and step sizes in u (n), n <= lanes.
   BatchView states(std::size_t n) { return view(states_, n); }
   std::span<double> step_sizes(std::size_t n) { return {step_sizes_.front().value, n}; }
 
-  /// Advances every lane by its step. After it, `results(n)` are the new states and, with E the estimated
-  /// error of component i per unit of u divided by absolute + relative max(|x_i|, |result_i|),
-  /// `squared_errors(n)` holds max_i E^2, or NaN where a stage or the result was not finite.
+  /// Advances every lane by its step. After it, `results(n)` are the new states and `squared_errors(n)` the
+  /// squares of the estimated errors per unit of u, in units of the tolerance absolute + relative max(|x_i|,
+  /// |result_i|) and for the worst component; NaN where a stage or the result was not finite.
   void attempt(const Method& method, SegmentField& field, std::span<const double> D, std::size_t n);
 
   ConstBatchView results(std::size_t n) const { return {results_.front().value, dimension_, n, lanes}; }

@@ -56,46 +56,58 @@ struct Kernel {
       }
   }
 
-  WIENERTREE_INLINE void error(LaneShape shape, const double* before, const double* after,
-                               std::span<const StageTerm> terms, std::span<const StageTerm> low_terms,
-                               double relative, double absolute, double* squared) {
+  WIENERTREE_INLINE void grow(Vector& largest, const Vector& value) {
+    const Vector size = value < 0.0 ? -value : value;
+    largest = size > largest ? size : largest;
+  }
+
+  WIENERTREE_INLINE void error(LaneShape shape, const double* before, const double* after, const double* h,
+                               const ErrorTerms& terms, double relative, double absolute, double* squared) {
     for (std::size_t lane = 0; lane < shape.lanes; lane += group) {
-      Group largest{}, poison{};
+      Group e{}, g{}, slope{}, poison{};
       for (std::size_t i = 0; i < shape.components; ++i) {
         const std::size_t at = i * shape.stride + lane;
-        Group e, e_low;
-        sum(terms, at, e);
-        sum(low_terms, at, e_low);
+        Group e_i, g_i;
+        sum(terms.e, at, e_i);
+        sum(terms.g, at, g_i);
         for (std::size_t r = 0; r < registers; ++r) {
-          Vector x, y;
+          Vector x, y, k, step;
           load(before + at + r * width, x);
           load(after + at + r * width, y);
-          const Vector size_x = x < 0.0 ? -x : x, size_y = y < 0.0 ? -y : y;
-          const Vector unit = 1.0 / ((size_x > size_y ? size_x : size_y) * relative + absolute);
-          const Vector high = e.part[r] * unit, low = e_low.part[r] * unit;
-          Vector square = high * high;
-          if (!low_terms.empty())
-            square = square * square / (square + low * low * 0.01 + 1e-300);  // 0 / 0 must be 0
-          largest.part[r] = square > largest.part[r] ? square : largest.part[r];
-          poison.part[r] += (square - square) + (y - y);  // 0, or NaN once anything was not finite
+          load(terms.first_stage + at + r * width, k);
+          load(h + lane + r * width, step);
+          Vector size{};
+          grow(size, x);
+          grow(size, y);
+          const Vector unit = 1.0 / (size * relative + absolute);
+          grow(e.part[r], e_i.part[r] * unit);
+          grow(g.part[r], g_i.part[r] * unit);
+          grow(slope.part[r], k * unit);
+          grow(slope.part[r], (y - x) / step * unit);
+          // 0, or NaN once anything was not finite: comparisons with NaN above keep the other value.
+          poison.part[r] += (e_i.part[r] - e_i.part[r]) + (g_i.part[r] - g_i.part[r]) + (y - y);
         }
       }
-      for (std::size_t r = 0; r < registers; ++r)
-        store(squared + lane + r * width, largest.part[r] + poison.part[r]);
+      for (std::size_t r = 0; r < registers; ++r) {
+        const Vector ratio = g.part[r] / (slope.part[r] + 1e-300);  // 0 / 0 must be 0
+        Vector guard = g.part[r] * g.part[r] * ratio * (terms.guard_weight * terms.guard_weight);
+        if (terms.guard_power == 4) guard *= ratio;
+        const Vector estimate = e.part[r] * e.part[r];
+        store(squared + lane + r * width, (guard > estimate ? guard : estimate) + poison.part[r]);
+      }
     }
   }
 };
 
-#define WIENERTREE_KERNEL(name, Vector, attributes)                                                    \
-  attributes void combine_##name(LaneShape shape, const double* base, const double* h,                 \
-                                 std::span<const StageTerm> terms, double* out) {                      \
-    Kernel<Vector>::combine(shape, base, h, terms, out);                                               \
-  }                                                                                                    \
-  attributes void error_##name(LaneShape shape, const double* before, const double* after,             \
-                               std::span<const StageTerm> terms, std::span<const StageTerm> low_terms, \
-                               double relative, double absolute, double* squared) {                    \
-    Kernel<Vector>::error(shape, before, after, terms, low_terms, relative, absolute, squared);        \
-  }                                                                                                    \
+#define WIENERTREE_KERNEL(name, Vector, attributes)                                                          \
+  attributes void combine_##name(LaneShape shape, const double* base, const double* h,                       \
+                                 std::span<const StageTerm> terms, double* out) {                            \
+    Kernel<Vector>::combine(shape, base, h, terms, out);                                                     \
+  }                                                                                                          \
+  attributes void error_##name(LaneShape shape, const double* before, const double* after, const double* h,  \
+                               const ErrorTerms& terms, double relative, double absolute, double* squared) { \
+    Kernel<Vector>::error(shape, before, after, h, terms, relative, absolute, squared);                      \
+  }                                                                                                          \
   constexpr RungeKuttaKernel kernel_##name{combine_##name, error_##name};
 
 WIENERTREE_KERNEL(portable, Two, )

@@ -17,15 +17,23 @@ struct LaneShape {
   std::size_t components, stride, lanes;  ///< lanes: a multiple of 16, at most stride
 };
 
+/// The two error estimates of a pair, see runge_kutta_pairs.hpp.
+struct ErrorTerms {
+  std::span<const StageTerm> e, g;
+  const double* first_stage;  ///< k_1
+  int guard_power;            ///< r
+  double guard_weight;        ///< w
+};
+
 struct RungeKuttaKernel {
   /// out = base + h sum_t coefficient_t stage_t.   h: `lanes` values.
   void (*combine)(LaneShape shape, const double* base, const double* h, std::span<const StageTerm> terms,
                   double* out);
-  /// squared(lane) = max over components of E^2, with e and e' the sums over `terms` and `low_terms`: E is
-  /// |e| / (absolute + relative max(|before|, |after|)), or e^2 / sqrt(e^2 + 0.01 e'^2) scaled alike when
-  /// there are low terms. NaN where e, e' or `after` is not finite.
-  void (*error)(LaneShape shape, const double* before, const double* after, std::span<const StageTerm> terms,
-                std::span<const StageTerm> low_terms, double relative, double absolute, double* squared);
+  /// squared(lane) = max(|e|, w |g| (|g| / S)^(r/2 - 1))^2, where |e|, |g| and S = max(|k_1|, |after -
+  /// before| / h) are maxima over the components, each in units of its tolerance absolute + relative
+  /// max(|before|, |after|). NaN where anything is not finite.
+  void (*error)(LaneShape shape, const double* before, const double* after, const double* h,
+                const ErrorTerms& terms, double relative, double absolute, double* squared);
 };
 
 /// The widest kernel this machine runs. All of them return the same bits: they are plain IEEE operations in
