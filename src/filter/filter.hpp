@@ -74,7 +74,7 @@ struct FilterOptions {
   /// An unpruned tree is refused before a step that would need more memory than this, in bytes.
   double memory_limit = 4.0e9;
   /// Grid filter: number of cells, and the longest step in units of the density's own time scale.
-  std::size_t grid_points = 800;
+  std::size_t grid_points = 400;
   double grid_step = 0.25;
 };
 

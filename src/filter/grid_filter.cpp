@@ -10,17 +10,23 @@
 namespace wienertree {
 namespace {
 
-// Rounding errors of the density are below this part of its largest value; an observation may not leave more
-// than `tolerated` of its likelihood to them.
-constexpr double rounding = 1e-12, tolerated = 1e-6;
+// Rounding errors of the density are below this part of its largest value; of the likelihood of an
+// observation they may make up no more than `tolerated`.
+constexpr double rounding = 1e-15, tolerated = 1e-5;
 // The change of log density over a cell at which differences of order 8 still have four digits.
 constexpr double roughest = 0.5;
-// The first part of the first gap is passed in eight steps of 2^-7 of it on one grid. The shortest waves of
-// the point mass shrink in each by the rational exponential's 7/z at z = sigma^2 s (pi/width)^2/2, about 550:
-// to 1e-15 in all.
-constexpr int point_steps = 8, point_halvings = 7;
-constexpr int most_halvings = 40, most_repetitions = 30;
+// A point mass is spread in eight equal steps on one grid of 27 standard deviations, during which the mean
+// moves by at most one. The shortest waves shrink in each by the rational exponential's 7/z at z = sigma^2 s
+// (pi/width)^2/2, about 100 with 100 points and 1600 with 400.
+constexpr int point_steps = 8, fewest_point_halvings = 7;
+constexpr int most_halvings = 40, most_repetitions = 20;
 constexpr std::size_t fewest_points = 32;
+
+void require_halvings(double halvings, const ObservationWindow& window) {
+  if (!(halvings <= most_halvings))
+    throw RunError("the density changes too fast for the length of the step", place(window),
+                   fmt::format("{} halvings", halvings));
+}
 
 const Model& checked(const Model& model, const FilterOptions& options) {
   const std::string where = "model " + model.name;
@@ -71,9 +77,6 @@ void GridFilter::advance(const ObservationWindow& window) {
     evolve(window.length(), {}, window);
   }
   if (!window.at_start) weigh(window);
-  if (spread_ && roughness(density_) > roughest)
-    throw RunError("the grid is too coarse for the density: more points are needed", place(window),
-                   fmt::format("{} points", density_.grid().cells));
   posterior_.time = window.end;
   ++statistics_.steps;
 }
@@ -82,25 +85,26 @@ void GridFilter::advance(const ObservationWindow& window) {
 void GridFilter::evolve(double length, std::span<const double> slope, const ObservationWindow& window) {
   double passed = 0;  // of the gap; exact
   if (!spread_) {
-    spread_point(length, slope, window);
-    passed = std::ldexp(point_steps, -point_halvings);
+    passed = spread_point(length, slope, window);
   }
   while (passed < 1) {
     prepare_fields(window);
     const double halvings = std::ceil(std::log2(length * fields_.rate(density_) / longest_step_));
-    if (!(halvings <= most_halvings))
-      throw RunError("the density changes too fast", place(window),
-                     fmt::format("rate {}", fields_.rate(density_)));
+    require_halvings(halvings, window);
     double part = std::exp2(-std::max(0.0, halvings));
     while (passed + part > 1) part /= 2;
     guarded_step(part * length, slope, window);
     passed += part;
     if (density_.follow_mass()) fields_current_ = false;
+    if (!(roughness(density_) <= roughest))
+      throw RunError("the grid is too coarse for the density: more points are needed", place(window),
+                     fmt::format("{} points", density_.grid().cells));
   }
 }
 
-void GridFilter::spread_point(double length, std::span<const double> slope, const ObservationWindow& window) {
-  const double s = std::ldexp(length, -point_halvings), time = s * point_steps;
+// Returns the part of the gap that was passed: so short that the coefficients hardly change over the grid.
+double GridFilter::spread_point(double length, std::span<const double> slope,
+                                const ObservationWindow& window) {
   Batch x(1, 1), drift(1, 1), diffusion(model_.noise_dimension(), 1);
   x(0, 0) = start_;
   model_.fields->ito_drift(x, drift);
@@ -110,14 +114,21 @@ void GridFilter::spread_point(double length, std::span<const double> slope, cons
   if (!(variance > 0))
     throw RunError("the grid filter needs a signal that diffuses at its start", place(window),
                    fmt::format("{} = {}", model_.state_names[0], start_));
-  density_.set_point(start_, 8 * std::sqrt(variance * time) + std::fabs(drift(0, 0)) * time);
   spread_ = true;
-  fields_current_ = false;
-  for (int i = 0; i < point_steps; ++i) {
-    prepare_fields(window);
-    guarded_step(s, slope, window);
+  for (int halvings = fewest_point_halvings;; ++halvings) {
+    require_halvings(halvings, window);
+    const double s = std::ldexp(length, -halvings), time = point_steps * s, sd = std::sqrt(variance * time);
+    if (std::fabs(drift(0, 0)) * time > sd) continue;
+    density_.set_point(start_, 8 * sd);
+    if (!fields_.nearly_constant(density_.grid(), drift(0, 0), variance, time)) continue;
+    fields_current_ = false;
+    for (int i = 0; i < point_steps; ++i) {
+      prepare_fields(window);
+      guarded_step(s, slope, window);
+    }
+    if (density_.follow_mass()) fields_current_ = false;
+    return time / length;
   }
-  if (density_.follow_mass()) fields_current_ = false;
 }
 
 void GridFilter::prepare_fields(const ObservationWindow& window) {
@@ -158,31 +169,34 @@ void GridFilter::step(double s, std::span<const double> slope, const Observation
 }
 
 // Times equal to a part in 1e10 share a factorisation: gaps between rows are differences of rounded times.
+// The matrix conserves mass; restoring it keeps the rounding errors of many steps from adding up in the
+// evidence.
 void GridFilter::transport(double s) {
   if (std::fabs(s - exponential_of_) > 1e-10 * s) {
     exponential_.assign(generator_, s);
     exponential_of_ = s;
   }
+  const double mass = density_.mass();
   exponential_.apply(density_.values());
+  density_.scale(mass / density_.mass());
 }
 
-// density <- density exp(factor log_factor) / mass, the mass going to the evidence. `noise`: values of the
-// density below it are rounding errors.
+// density <- density exp(factor log_factor) / mass, the mass going to the evidence. Rounding errors of the
+// size of `noise` at every node must not matter for the result.
 void GridFilter::multiply(double factor, double noise, const ObservationWindow& window) {
   const std::span<double> rho = density_.values();
   double reference = -INFINITY;
   for (std::size_t n = 0; n < rho.size(); ++n)
     if (rho[n] > noise) reference = std::max(reference, log_factor_[n]);
-  double sure = 0, unsure = 0;
+  double total = 0, errors = 0;
   for (std::size_t n = 0; n < rho.size(); ++n) {
-    const bool is_noise = rho[n] <= noise;
-    // Where rounding errors would be raised by e^100 they are mass that is not there, whatever the factor.
-    rho[n] *= std::exp(factor * std::min(log_factor_[n] - reference, 100 / factor));
-    (is_noise ? unsure : sure) += std::fabs(rho[n]);
+    const double ratio = std::exp(factor * (log_factor_[n] - reference));
+    total += rho[n] *= ratio;
+    errors += noise * ratio;
   }
-  if (!(std::isfinite(reference) && sure > 0 && std::isfinite(sure + unsure)))
+  if (!std::isfinite(reference) || !(total > 0))
     throw RunError("the observation has no likelihood", place_and_observation(window));
-  if (unsure > tolerated * sure)
+  if (!(errors <= tolerated * total))
     throw RunError("the observation lies where the density is below rounding errors",
                    place_and_observation(window));
   const double mass = density_.mass();
@@ -228,9 +242,8 @@ const Posterior& GridFilter::posterior() {
     points_.reshape(1, grid.cells);
     covariance_.reshape(1, 1);
     weight_.resize(grid.cells);
-    for (std::size_t n = 0; n < grid.cells; ++n) points_(0, n) = grid.node(n);
     covariance_(0, 0) = grid.width * grid.width;
-    gaussian_sum(density_, weight_, scratch_);
+    density_.gaussian_sum(points_.component(0), weight_, scratch_);
   } else {
     points_.reshape(1, 1);
     points_(0, 0) = start_;

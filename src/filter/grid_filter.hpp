@@ -38,7 +38,7 @@ class GridFilter final : public Filter {
   std::string_view name() const override { return "grid"; }
 
  private:
-  void spread_point(double length, std::span<const double> slope, const ObservationWindow& window);
+  double spread_point(double length, std::span<const double> slope, const ObservationWindow& window);
   void evolve(double length, std::span<const double> slope, const ObservationWindow& window);
   void guarded_step(double s, std::span<const double> slope, const ObservationWindow& window);
   void step(double s, std::span<const double> slope, const ObservationWindow& window);

@@ -1,6 +1,7 @@
 #include "wienertree/filter/line_density.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numbers>
 #include <numeric>
@@ -106,29 +107,48 @@ void LineDensity::widen() {
   scale(before / mass());
 }
 
-void gaussian_sum(const LineDensity& density, std::span<double> weight, std::vector<double>& scratch) {
+void LineDensity::gaussian_sum(std::span<double> point, std::span<double> weight,
+                               std::vector<double>& scratch) const {
   static const std::vector<double> c = central_difference(4);
-  const std::size_t n = weight.size(), m = c.size();
-  std::copy(density.values().begin(), density.values().end(), weight.begin());
-  // derivative_j = (width^2 d^2/dx^2)^j density, with m zeros on either side
+  const std::size_t n = values_.size(), m = c.size();
+  // (width^2 d^2/dx^2)^j density, with m values on either side
   scratch.assign(2 * (n + 2 * m), 0.0);
   double *from = scratch.data() + m, *to = from + n + 2 * m;
-  std::copy(weight.begin(), weight.end(), from);
+  std::copy(values_.begin(), values_.end(), from);
+  std::copy(values_.begin(), values_.end(), weight.begin());
   double factor = 1;  // (-1/2)^j / j!
   for (std::size_t j = 1; j <= terms; ++j) {
     factor *= -0.5 / static_cast<double>(j);
+    for (std::size_t k = 0; k < m; ++k) {
+      *(from - 1 - k) = at_lowest_ ? from[k] : 0.0;
+      from[n + k] = at_highest_ ? from[n - 1 - k] : 0.0;
+    }
     for (std::size_t i = 0; i < n; ++i) {
-      double second = 0;
+      to[i] = 0;
       for (std::size_t k = 1; k <= m; ++k)
-        second += 2 * c[k - 1] / static_cast<double>(k) * (from[i + k] - 2 * from[i] + *(from + i - k));
-      to[i] = second;
-      weight[i] += factor * second;
+        to[i] += 2 * c[k - 1] / static_cast<double>(k) * (from[i + k] - 2 * from[i] + *(from + i - k));
+      weight[i] += factor * to[i];
     }
     std::swap(from, to);
   }
-  double total = 0;
-  for (double& w : weight) total += w = std::max(w, 0.0);
-  for (double& w : weight) w /= total;
+  for (double& w : weight) w = std::max(w, 0.0);
+  const auto moments = [&](std::span<const double> mass) {
+    double total = 0, first = 0, second = 0;
+    for (std::size_t i = 0; i < n; ++i) {
+      total += mass[i];
+      first += mass[i] * grid_.node(i);
+    }
+    first /= total;
+    for (std::size_t i = 0; i < n; ++i) second += mass[i] * (grid_.node(i) - first) * (grid_.node(i) - first);
+    return std::array{total, first, second / total};
+  };
+  const auto [mass, mean, variance] = moments(values_);
+  const auto [sum, centre, spread] = moments(weight);
+  const double stretch = std::sqrt((variance - grid_.width * grid_.width) / spread);
+  for (std::size_t i = 0; i < n; ++i) {
+    point[i] = mean + stretch * (grid_.node(i) - centre);
+    weight[i] /= sum;
+  }
 }
 
 }  // namespace wienertree

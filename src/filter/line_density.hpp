@@ -47,6 +47,14 @@ class LineDensity {
   /// Makes the grid 1.6 times as wide, where the bounds allow.
   void widen();
 
+  /// The density as sum_i weight_i N(point_i, width^2): masses at the nodes under width exp(-width^2/2
+  /// d^2/dx^2), the inverse of the Gaussians' smoothing, up to width^8 with differences of order 8 and even
+  /// continuation beyond a bound. A resolved density keeps its moments up to degree 9. Weights below zero,
+  /// which rounding makes in the tails and a jump at a bound near it, become zero; the points are moved and
+  /// stretched so that mean and variance are the density's in any case.   point, weight: as many as cells
+  /// @pre the variance exceeds width^2
+  void gaussian_sum(std::span<double> point, std::span<double> weight, std::vector<double>& scratch) const;
+
  private:
   void lay_around(double low, double high);
   bool has_room(Support support, double part) const;
@@ -56,11 +64,5 @@ class LineDensity {
   bool at_lowest_ = false, at_highest_ = false;  // whether the grid ends at the bound
   std::vector<double> values_, laid_;
 };
-
-/// Weights of Gaussians N(node_i, width^2) whose sum has the moments of the density up to degree 9:
-/// width exp(-width^2/2 d^2/dx^2) density, the exponential up to width^8 with central differences of order 8.
-/// Weights below zero, which rounding makes in the tails, become zero; the sum is 1.
-/// weight, scratch: as many as cells
-void gaussian_sum(const LineDensity& density, std::span<double> weight, std::vector<double>& scratch);
 
 }  // namespace wienertree

@@ -21,10 +21,13 @@ void for_mass(const LineDensity& density, Add add) {
 
 }  // namespace
 
-LineFields::LineFields(const Model& model) : fields_(model.fields.get()), state_name_(model.state_names[0]) {}
+LineFields::LineFields(const Model& model)
+    : fields_(model.fields.get()),
+      sensors_(model.observation == ObservationKind::continuous ? fields_->sensor_dimension() : 0),
+      state_name_(model.state_names[0]) {}
 
-void LineFields::read(const LineGrid& grid, const std::string& where) {
-  const std::size_t n = grid.cells, p = fields_->noise_dimension(), k = fields_->sensor_dimension();
+void LineFields::evaluate(const LineGrid& grid) {
+  const std::size_t n = grid.cells, p = fields_->noise_dimension(), k = sensors_;
   nodes_.reshape(1, n);
   drift_.reshape(1, n);
   diffusion_.reshape(p, n);
@@ -38,9 +41,21 @@ void LineFields::read(const LineGrid& grid, const std::string& where) {
   variance_.assign(n, 0.0);
   for (std::size_t r = 0; r < p; ++r)
     for (std::size_t i = 0; i < n; ++i) variance_[i] += diffusion_(r, i) * diffusion_(r, i);
-  for (std::size_t i = 0; i < n; ++i) {
+}
+
+bool LineFields::nearly_constant(const LineGrid& grid, double b, double variance, double time) {
+  evaluate(grid);
+  const double sd = std::sqrt(variance * time);
+  for (std::size_t i = 0; i < grid.cells; ++i)
+    if (!(std::fabs(drift_(0, i) - b) * time <= sd && variance_[i] <= 4 * variance)) return false;
+  return true;
+}
+
+void LineFields::read(const LineGrid& grid, const std::string& where) {
+  evaluate(grid);
+  for (std::size_t i = 0; i < grid.cells; ++i) {
     double total = drift_(0, i) + variance_[i];
-    for (std::size_t j = 0; j < k; ++j) total += sensor_(j, i);
+    for (std::size_t j = 0; j < sensors_; ++j) total += sensor_(j, i);
     if (!std::isfinite(total))
       throw RunError(
           "a coefficient is not finite on the grid: bounds of the state keep the grid where they are", where,
