@@ -201,6 +201,30 @@ TEST_CASE("Multinomial counts have the multinomial law") {
   CHECK(chi_square(got, expected) < chi_square_bound(9, 1));
 }
 
+TEST_CASE("Strata are drawn independently, the steps of systematic counts together") {
+  // H0: 2 particles on 4 equal sites. Stratified: each half takes either of its sites, 4 equally likely
+  // outcomes. Systematic: sites 0 and 2, or 1 and 3, each half of the time. 2^14 draws.
+  const Measure m(std::vector<double>(4, 1.0));
+  for (const ThinningMethod method : {ThinningMethod::stratified, ThinningMethod::systematic}) {
+    const auto thinning = make_thinning({method, SiteOrder::tree});
+    std::map<std::vector<std::uint32_t>, double> observed;
+    Selection s;
+    for (std::uint32_t k = 0; k < 1 << 14; ++k) {
+      thinning->thin(m, 2, {32, 0, k}, s);
+      ++observed[s.site];
+    }
+    std::vector<double> got;
+    for (const auto& [sites, n] : observed) {
+      CHECK((sites.size() == 2 && sites[0] < 2 && sites[1] >= 2));
+      if (method == ThinningMethod::systematic) CHECK(sites[1] == sites[0] + 2);
+      got.push_back(n);
+    }
+    REQUIRE(got.size() == (method == ThinningMethod::stratified ? 4 : 2));
+    const std::vector<double> expected(got.size(), 16384.0 / static_cast<double>(got.size()));
+    CHECK(chi_square(got, expected) < chi_square_bound(static_cast<double>(got.size()) - 1, 2));
+  }
+}
+
 TEST_CASE("Nasty measures give valid selections") {
   std::vector<double> huge = normals(40, 8), wide = normals(500, 9), lone(30, -INFINITY),
                       tiny = normals(100, 10);
