@@ -14,6 +14,8 @@ namespace {
 /// it).
 constexpr double share_of_tolerance = 0.01;
 constexpr long max_steps = 20000;
+/// A solution that leaves every bound at some u < 1 makes steps shrink for ever.
+constexpr double min_step = 1e-15;
 
 void require(bool condition, const char* call) {
   if (!condition) throw RunError("SUNDIALS cannot be set up", "flow cvode", call);
@@ -50,6 +52,7 @@ CvodeIntegrator::CvodeIntegrator(SegmentField& field, FlowTolerance tolerance)
           "CVodeSStolerances");
   require(CVodeSetUserData(memory, this) == CV_SUCCESS, "CVodeSetUserData");
   require(CVodeSetMaxNumSteps(memory, max_steps) == CV_SUCCESS, "CVodeSetMaxNumSteps");
+  require(CVodeSetMinStep(memory, min_step) == CV_SUCCESS, "CVodeSetMinStep");
   require(CVodeSetMaxHnilWarns(memory, -1) == CV_SUCCESS, "CVodeSetMaxHnilWarns");
   make_linear_solver();
 }

@@ -76,5 +76,7 @@ inline constexpr std::size_t flow_block = 64;
 /// `explicit_` chooses its order.
 /// @throws InputError if `exact` is asked of a model without closed form, or a tolerance is not positive
 std::unique_ptr<Flow> make_flow(FlowMethod method, const Model& model, FlowTolerance tolerance, int degree);
+std::unique_ptr<Flow> make_flow(FlowMethod method, const Model&& model, FlowTolerance tolerance,
+                                int degree) = delete;
 
 }  // namespace wienertree

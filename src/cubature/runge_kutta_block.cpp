@@ -10,7 +10,7 @@ constexpr std::size_t max_stages = 13;
 }  // namespace
 
 RungeKuttaBlock::RungeKuttaBlock(std::size_t dimension, FlowTolerance tolerance)
-    : kernel_(runge_kutta_kernel()), dimension_(dimension), tolerance_(tolerance) {
+    : kernel_(runge_kutta_kernels().back()), dimension_(dimension), tolerance_(tolerance) {
   constexpr std::size_t octets = lanes / 8;
   for (Octets* block : {&states_, &arguments_, &results_}) block->resize(dimension * octets);
   for (Octets* row : {&step_sizes_, &squared_errors_}) row->resize(octets);

@@ -118,14 +118,15 @@ WIENERTREE_KERNEL(avx512, Eight, [[gnu::target("avx512f")]])
 
 }  // namespace
 
-const RungeKuttaKernel& runge_kutta_kernel() {
+std::span<const RungeKuttaKernel> runge_kutta_kernels() {
 #if defined(__x86_64__)
-  static const RungeKuttaKernel& widest = __builtin_cpu_supports("avx512f") ? kernel_avx512
-                                          : __builtin_cpu_supports("avx2")  ? kernel_avx2
-                                                                            : kernel_portable;
-  return widest;
+  static constexpr RungeKuttaKernel kernels[] = {kernel_portable, kernel_avx2, kernel_avx512};
+  static const std::size_t count = __builtin_cpu_supports("avx512f") ? 3
+                                   : __builtin_cpu_supports("avx2")  ? 2
+                                                                     : 1;
+  return {kernels, count};
 #else
-  return kernel_portable;
+  return {&kernel_portable, 1};
 #endif
 }
 

@@ -36,8 +36,8 @@ struct RungeKuttaKernel {
                 const ErrorTerms& terms, double relative, double absolute, double* squared);
 };
 
-/// The widest kernel this machine runs. All of them return the same bits: they are plain IEEE operations in
-/// one order.
-const RungeKuttaKernel& runge_kutta_kernel();
+/// The kernels this machine runs, the widest last. All of them return the same bits: they are plain IEEE
+/// operations in one order.
+std::span<const RungeKuttaKernel> runge_kutta_kernels();
 
 }  // namespace wienertree

@@ -5,8 +5,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "wienertree/tree/initial.hpp"
 #include "wienertree/filter/places.hpp"
+#include "wienertree/tree/initial.hpp"
 
 namespace wienertree {
 namespace {
@@ -37,6 +37,7 @@ EulerFilter::EulerFilter(const Model& model, const FilterOptions& options)
   noise_.reshape(model_.noise_dimension(), N);
   log_weight_.assign(N, -std::log(static_cast<double>(N)));
   term_.resize(N);
+  normalised_.assign(log_weight_, {}, "start");
 }
 
 void EulerFilter::advance(const ObservationWindow& window) {

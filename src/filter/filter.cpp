@@ -23,6 +23,12 @@ void check_node_options(const FilterOptions& options) {
 void check_tree_options(const Model& model, const FilterOptions& options) {
   check_node_options(options);
   check_formula_fits(options.formula, model);
+  if (options.prune_weights == PruneWeights::cubature &&
+      options.thinning.method == ThinningMethod::recombination)
+    throw InputError(
+        "recombination merges states, and a likelihood carried along belongs to a whole path: thin "
+        "cubature weights by a method that counts, tbba for one",
+        "prune-weights", "cubature");
   if (!(options.memory_limit > 0))
     throw InputError("must be positive", "memory limit", fmt::format("{}", options.memory_limit));
 }

@@ -50,7 +50,8 @@ enum class FilterMethod { klv, full_tree, euler, benes, kalman_bucy, kalman, gri
 
 /// Which weights decide where the particles go (Crisan, Ortiz-Latorre 2013, versions 1 and 2).
 enum class PruneWeights {
-  cubature,    ///< cubature weights alone; likelihoods are carried along
+  cubature,    ///< cubature weights alone; likelihoods are carried along, each with its path: not for
+               ///< recombination
   likelihood,  ///< cubature weights times likelihoods
 };
 

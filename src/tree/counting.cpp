@@ -52,40 +52,47 @@ void CountingThinning::thin(const Sites& sites, std::size_t budget, const Random
                             Selection& out) {
   check_shapes(sites);
   assign_masses(sites.log_weight, budget, masses_);
+  if (order_ == SiteOrder::tree && sites.parents == 0) {
+    // Visited as they are stored; a site without weight has no mass.
+    count_particles(masses_.mass, random);
+    collect([](std::size_t i) { return i; }, out);
+    return;
+  }
   put_in_order(order_, ordering_, sites, masses_, visit_);
   visited_mass_.resize(visit_.size());
   for (std::size_t i = 0; i < visit_.size(); ++i) visited_mass_[i] = masses_.mass[visit_[i]];
-  count_.resize(visit_.size());
-  count_particles(random);
-  collect(out);
+  count_particles(visited_mass_, random);
+  collect([this](std::size_t i) { return visit_[i]; }, out);
 }
 
-void CountingThinning::count_particles(const RandomStream& random) {
+void CountingThinning::count_particles(std::span<const std::uint64_t> mass, const RandomStream& random) {
+  count_.resize(mass.size());
   const int bits = masses_.fraction_bits;
   switch (method_) {
     case ThinningMethod::multinomial:
-      return multinomial_counts(visited_mass_, bits, random, count_);
+      return multinomial_counts(mass, bits, random, count_);
     case ThinningMethod::residual:
-      return residual_counts(visited_mass_, bits, random, count_);
+      return residual_counts(mass, bits, random, count_);
     case ThinningMethod::stratified:
-      return stratified_counts(visited_mass_, bits, random, count_);
+      return stratified_counts(mass, bits, random, count_);
     case ThinningMethod::systematic:
-      return systematic_counts(visited_mass_, bits, random, count_);
+      return systematic_counts(mass, bits, random, count_);
     default:
       break;
   }
   TbbaRemainder all{masses_.particles << bits, false};
-  tbba(visited_mass_, bits, random, 0, all, count_);
+  tbba(mass, bits, random, 0, all, count_);
 }
 
-void CountingThinning::collect(Selection& out) {
-  const std::size_t most = std::min<std::size_t>(visit_.size(), masses_.particles) + 1;  // one to overwrite
+template <class SiteAt>
+void CountingThinning::collect(SiteAt site_at, Selection& out) {
+  const std::size_t most = std::min<std::size_t>(count_.size(), masses_.particles) + 1;  // one to overwrite
   out.site.resize(most);
   out.count.resize(most);
   out.log_weight.resize(most);
   std::size_t kept = 0;
-  for (std::size_t i = 0; i < visit_.size(); ++i) {
-    out.site[kept] = visit_[i];
+  for (std::size_t i = 0; i < count_.size(); ++i) {
+    out.site[kept] = static_cast<std::uint32_t>(site_at(i));
     out.count[kept] = count_[i];
     kept += count_[i] > 0 ? 1 : 0;
   }

@@ -1,5 +1,6 @@
 #pragma once
 /// The random thinnings that count particles: one code path, in which a method is only the law of the counts.
+#include <span>
 #include <string_view>
 
 #include "wienertree/tree/masses.hpp"
@@ -21,8 +22,9 @@ class CountingThinning final : public Thinning {
   std::string_view name() const override;
 
  private:
-  void count_particles(const RandomStream& random);
-  void collect(Selection& out);
+  void count_particles(std::span<const std::uint64_t> mass, const RandomStream& random);
+  template <class SiteAt>
+  void collect(SiteAt site_at, Selection& out);
 
   ThinningMethod method_;
   SiteOrder order_;

@@ -11,6 +11,8 @@
 namespace wienertree {
 namespace {
 
+constexpr std::size_t fewest_points =
+    1000;                      // of a grid: the first observation may be much sharper than the start
 constexpr double reach = 6.0;  // mass beyond 6 standard deviations: 2e-9
 
 // Columns are standard normal points in R^r with log-weights, normalised to mass one.
@@ -71,8 +73,8 @@ Generation first_generation(const Model& model, std::size_t nodes) {
   if (r == 0) {
     standard = {Eigen::MatrixXd(0, 1), Eigen::VectorXd::Zero(1)};
   } else {
-    const auto per_axis = static_cast<Eigen::Index>(
-        std::floor(std::pow(static_cast<double>(nodes), 1.0 / static_cast<double>(r)) + 1e-9));
+    const auto per_axis = static_cast<Eigen::Index>(std::floor(
+        std::pow(static_cast<double>(std::max(nodes, fewest_points)), 1.0 / static_cast<double>(r)) + 1e-9));
     standard = per_axis >= 5 ? tensor_grid(r, per_axis) : cubature_points(r);
   }
   const Eigen::MatrixXd points = (root * standard.points).colwise() + law.mean;

@@ -11,6 +11,8 @@ namespace wienertree {
 /// density: the trapezoidal rule, which converges geometrically in the number of points for analytic
 /// integrands (Trefethen, Weideman 2014). With fewer than 5 points an axis the degree-5 Gaussian cubature
 /// takes its place.
+/// At least 1000 points are laid where N is smaller: a first observation may be much sharper than the start,
+/// and thinning comes after it.
 /// @param nodes N >= 1   @throws InputError if the covariance is not positive semidefinite
 Generation first_generation(const Model& model, std::size_t nodes);
 

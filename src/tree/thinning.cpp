@@ -1,7 +1,7 @@
 #include "wienertree/tree/thinning.hpp"
 
-#include "wienertree/model/error.hpp"
 #include "wienertree/tree/counting.hpp"
+#include "wienertree/tree/recombination.hpp"
 
 namespace wienertree {
 
@@ -10,7 +10,7 @@ std::unique_ptr<Thinning> make_thinning(const ThinningOptions& options) {
     case ThinningMethod::none:
       return std::make_unique<KeepAll>(options.order);
     case ThinningMethod::recombination:
-      throw InputError("this build has no patched recombination", "thinning", "recombination");
+      return make_recombination(options.recombination_degree);
     default:
       return std::make_unique<CountingThinning>(options.method, options.order);
   }

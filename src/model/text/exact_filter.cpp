@@ -32,16 +32,16 @@ std::string component_name(const ExactFilterQuestion& question, std::size_t i) {
 /// Empty when it holds, else what differs.
 using Difference = std::string;
 
-Difference moving_bounds(const ExactFilterQuestion& question) {
+Difference bounds(const ExactFilterQuestion& question) {
   for (std::size_t i = 0; i < question.model.bounds.size(); ++i)
-    if (question.model.bounds[i].bounded() && question.model.bounds[i].boundary != Boundary::error)
-      return fmt::format("state.{} has a boundary", component_name(question, i));
+    if (question.model.bounds[i].bounded())
+      return fmt::format("state.{} is bounded", component_name(question, i));
   return {};
 }
 
 Difference not_linear_gaussian(const ExactFilterQuestion& question) {
   const FieldExpressions& bound = question.bound;
-  if (Difference difference = moving_bounds(question); !difference.empty()) return difference;
+  if (Difference difference = bounds(question); !difference.empty()) return difference;
   for (std::size_t i = 0; i < bound.d; ++i)
     for (std::size_t j = 1; j <= bound.p; ++j)
       if (!bound.fields[j][i]->is_number())
@@ -109,7 +109,7 @@ Difference not_benes(const ExactFilterQuestion& question, BenesParameters& param
   if (bound.p != 1) return fmt::format("there are {} Brownian motions, not 1", bound.p);
   if (bound.sensor.size() != 1) return fmt::format("h has {} components, not 1", bound.sensor.size());
   if (question.model.initial_law) return "the start is random";
-  if (Difference difference = moving_bounds(question); !difference.empty()) return difference;
+  if (Difference difference = bounds(question); !difference.empty()) return difference;
   const Expression sigma = bound.fields[1][0];
   if (!sigma->is_number() || sigma->is_number(0))
     return fmt::format("diffusion.{} is not a constant other than 0: {}", component_name(question, 0),

@@ -1,0 +1,13 @@
+#pragma once
+/// The subcommands: each adds itself, its options and its help to the program.
+#include <CLI/CLI.hpp>
+
+namespace wienertree::app {
+
+void add_simulate_command(CLI::App& program);
+void add_filter_command(CLI::App& program);
+void add_formulas_command(CLI::App& program);
+void add_model_command(CLI::App& program);
+void add_tree_command(CLI::App& program);
+
+}  // namespace wienertree::app

@@ -1,0 +1,84 @@
+#include "density_plot.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "wienertree/filter/marginal.hpp"
+
+namespace wienertree::app {
+namespace {
+
+constexpr std::size_t points_a_curve = 400, most_ticks_of_a_rug = 400;
+
+struct Interval {
+  double low, high;
+};
+
+// Where nearly all of the law is.
+Interval bulk(const Posterior& posterior, std::size_t i) {
+  constexpr std::array levels = {0.002, 0.998};
+  std::array<double, 2> q{};
+  Marginal(posterior, i).quantiles(levels, q);
+  const double margin = q[1] > q[0] ? 0.15 * (q[1] - q[0]) : std::max(1e-6, 0.1 * std::fabs(q[0]));
+  return {q[0] - margin, q[1] + margin};
+}
+
+std::size_t bins_for(const Posterior& posterior) {
+  const double n = effective_sample_size(posterior);
+  return static_cast<std::size_t>(std::clamp(2 * std::cbrt(n) + 6, 8.0, 60.0));
+}
+
+Histogram histogram(const Posterior& posterior, std::size_t i) {
+  const Interval range = bulk(posterior, i);
+  const std::size_t bins = posterior.dirac() ? bins_for(posterior) : 60;
+  const Marginal law(posterior, i);
+  Histogram h;
+  for (std::size_t b = 0; b <= bins; ++b)
+    h.edges.push_back(range.low +
+                      (range.high - range.low) * static_cast<double>(b) / static_cast<double>(bins));
+  for (std::size_t b = 0; b < bins; ++b)
+    h.heights.push_back((law.distribution(h.edges[b + 1]) - law.distribution(h.edges[b])) /
+                        (h.edges[b + 1] - h.edges[b]));
+  return h;
+}
+
+Curve density_curve(const Posterior& posterior, std::size_t i) {
+  const Interval range = bulk(posterior, i);
+  const Marginal law(posterior, i);
+  Curve curve;
+  for (std::size_t j = 0; j < points_a_curve; ++j) {
+    curve.x.push_back(range.low + (range.high - range.low) * static_cast<double>(j) / (points_a_curve - 1));
+    curve.y.push_back(law.density(curve.x.back()));
+  }
+  return curve;
+}
+
+bool smooth(const Posterior& posterior, std::size_t i) {
+  return !posterior.dirac() && posterior.variance_of(i, 0) > 0;
+}
+
+std::vector<double> rug_of(const Posterior& posterior, std::size_t i) {
+  std::vector<double> ticks;
+  const std::size_t stride = 1 + posterior.size() / most_ticks_of_a_rug;
+  for (std::size_t n = 0; n < posterior.size(); n += stride) ticks.push_back(posterior.points(i, n));
+  return ticks;
+}
+
+}  // namespace
+
+std::vector<DensityPanel> density_panels(const std::vector<std::string>& states, const Posterior& posterior,
+                                         const Posterior* exact, const Posterior* prior) {
+  std::vector<DensityPanel> panels;
+  for (std::size_t i = 0; i < states.size(); ++i) {
+    DensityPanel panel{states[i], histogram(posterior, i), {}, {}, {}, {}, {}};
+    if (posterior.dirac()) panel.rug = rug_of(posterior, i);
+    if (exact != nullptr && smooth(*exact, i)) panel.exact = density_curve(*exact, i);
+    if (prior != nullptr && smooth(*prior, i)) panel.prior = density_curve(*prior, i);
+    if (prior != nullptr && prior->dirac()) panel.prior_nodes = histogram(*prior, i);
+    panels.push_back(std::move(panel));
+  }
+  return panels;
+}
+
+}  // namespace wienertree::app

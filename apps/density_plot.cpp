@@ -1,0 +1,120 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "density_plot.hpp"
+
+namespace wienertree::app {
+namespace {
+
+constexpr int width = 860, title_height = 44, panel_height = 350;
+
+// The outline of the bars as a curve.
+Curve outline(const Histogram& h) {
+  Curve curve{{h.edges.front()}, {0.0}};
+  for (std::size_t b = 0; b < h.heights.size(); ++b)
+    for (const std::size_t edge : {b, b + 1}) {
+      curve.x.push_back(h.edges[edge]);
+      curve.y.push_back(h.heights[b]);
+    }
+  curve.x.push_back(h.edges.back());
+  curve.y.push_back(0.0);
+  return curve;
+}
+
+struct Piece {
+  Curve curve;
+  std::string style;  ///< gnuplot's
+};
+
+std::vector<Piece> pieces_of(const DensityPanel& panel) {
+  const auto line = [](const char* style, const char* colour) {
+    return fmt::format("with lines {} lc rgb \"{}\"", style, colour);
+  };
+  std::vector<Piece> pieces = {
+      {outline(panel.nodes),
+       fmt::format("with filledcurves y=0 fillcolor rgb \"{}\" fs solid 0.6 noborder", colour::sky)}};
+  if (panel.prior) pieces.push_back({*panel.prior, line("lw 1.6 dashtype (8,5)", colour::grey)});
+  if (panel.prior_nodes) pieces.push_back({outline(*panel.prior_nodes), line("lw 1.3", colour::grey)});
+  if (panel.exact) pieces.push_back({*panel.exact, line("lw 2.2", colour::black)});
+  return pieces;
+}
+
+// What is drawn, in its colour, beside the panel from the top down.
+std::string labels_of(const DensityPanel& panel) {
+  std::vector<SideLabel> labels;
+  const auto add = [&](bool drawn, const char* text, const char* colour) {
+    if (drawn) labels.push_back({text, colour, 1.0});
+  };
+  add(true, panel.rug.empty() ? "filter" : "nodes, weighted", colour::blue);
+  add(panel.exact.has_value(), "exact posterior", colour::black);
+  add(panel.prior.has_value(), "prior (dashed)", colour::grey);
+  add(panel.prior_nodes.has_value(), "prior", colour::grey);
+  add(panel.signal.has_value(), "true signal", colour::vermillion);
+  return labels_at_right(std::move(labels), 20.0 / panel_height);
+}
+
+// A vertical line from the axis.
+std::string upright(const std::string& data, double height, double line_width, const char* colour) {
+  return fmt::format(", ${} using 1:(0):(0):({:.9g}) with vectors nohead lw {} lc rgb \"{}\"", data, height,
+                     line_width, colour);
+}
+
+void draw_panel(Picture& picture, const DensityPanel& panel, std::size_t number) {
+  const std::vector<Piece> pieces = pieces_of(panel);
+  double low = INFINITY, high = -INFINITY, top = 0;
+  for (const Piece& piece : pieces) {
+    low = std::min(low, piece.curve.x.front());
+    high = std::max(high, piece.curve.x.back());
+    top = std::max(top, *std::max_element(piece.curve.y.begin(), piece.curve.y.end()));
+  }
+  if (panel.signal) {
+    low = std::min(low, *panel.signal);
+    high = std::max(high, *panel.signal);
+  }
+  picture.add(fmt::format(
+      "set xrange [{:.9g}:{:.9g}]\nset yrange [0:{:.9g}]\nset xlabel {} noenhanced\nset ylabel \"density\"",
+      low, high, 1.12 * top, quoted(panel.state)));
+  picture.add(labels_of(panel));
+  std::string plot = "plot ";
+  for (std::size_t k = 0; k < pieces.size(); ++k) {
+    const std::string name = fmt::format("panel{}piece{}", number, k);
+    picture.add_data(name, std::array{pieces[k].curve.x, pieces[k].curve.y});
+    plot += fmt::format("{}${} using 1:2 {}", k > 0 ? ", " : "", name, pieces[k].style);
+  }
+  if (!panel.rug.empty()) {
+    const std::string name = fmt::format("panel{}rug", number);
+    picture.add_data(name, std::array{panel.rug});
+    plot += upright(name, 0.035 * top, 0.7, colour::blue);
+  }
+  if (panel.signal) {
+    const std::string name = fmt::format("panel{}signal", number);
+    picture.add_data(name, std::array{std::vector{*panel.signal}});
+    plot += upright(name, 1.12 * top, 1.6, colour::vermillion);
+  }
+  picture.add(plot);
+}
+
+}  // namespace
+
+std::string draw_density(Picture picture, const std::string& title, const std::vector<DensityPanel>& panels) {
+  const int count = static_cast<int>(panels.size()), height = title_height + count * panel_height;
+  picture.begin(width, height);
+  picture.add(fmt::format("set label 1 {} at screen 0.5,{:.4f} center noenhanced\nset multiplot",
+                          quoted(title), 1 - 0.55 * title_height / height));
+  picture.add(fmt::format("set lmargin at screen {:.4f}\nset rmargin at screen {:.4f}", 86.0 / width,
+                          1 - 150.0 / width));
+  for (int i = 0; i < count; ++i) {
+    const double top = 1 - static_cast<double>(title_height + i * panel_height) / height;
+    const double bottom = top - static_cast<double>(panel_height - 60) / height;
+    picture.add(fmt::format("set tmargin at screen {:.4f}\nset bmargin at screen {:.4f}", top, bottom));
+    if (i > 0) picture.add("unset label");
+    draw_panel(picture, panels[static_cast<std::size_t>(i)], static_cast<std::size_t>(i));
+  }
+  picture.add("unset multiplot");
+  return picture.draw();
+}
+
+}  // namespace wienertree::app

@@ -1,0 +1,35 @@
+#pragma once
+/// The law of the signal at one time as a picture.
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "gnuplot.hpp"
+#include "posterior_plot.hpp"
+#include "wienertree/filter/posterior.hpp"
+
+namespace wienertree::app {
+
+/// Density as bars: heights[b] on [edges[b], edges[b+1]].
+struct Histogram {
+  std::vector<double> edges, heights;
+};
+
+struct DensityPanel {
+  std::string state;
+  Histogram nodes;          ///< of the weighted nodes of the filter, or of a smooth posterior's probabilities
+  std::vector<double> rug;  ///< where the nodes are
+  std::optional<Curve> exact;  ///< exact posterior density
+  std::optional<Curve> prior;  ///< exact prior density, where there is one
+  std::optional<Histogram> prior_nodes;
+  std::optional<double> signal;
+};
+
+/// One panel for each of the first `states.size()` components. `exact` and `prior` may be null.
+std::vector<DensityPanel> density_panels(const std::vector<std::string>& states, const Posterior& posterior,
+                                         const Posterior* exact, const Posterior* prior);
+
+/// @returns the bytes of the picture  @throws RunError if gnuplot fails
+std::string draw_density(Picture picture, const std::string& title, const std::vector<DensityPanel>& panels);
+
+}  // namespace wienertree::app

@@ -1,0 +1,257 @@
+#include "filter_arguments.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <thread>
+
+#include "formula_choice.hpp"
+
+namespace wienertree::app {
+namespace {
+
+const Choices<FilterMethod> methods = {{"klv", FilterMethod::klv},
+                                       {"full-tree", FilterMethod::full_tree},
+                                       {"euler", FilterMethod::euler},
+                                       {"benes", FilterMethod::benes},
+                                       {"kalman-bucy", FilterMethod::kalman_bucy},
+                                       {"kalman", FilterMethod::kalman},
+                                       {"grid", FilterMethod::grid}};
+const Choices<ThinningMethod> thinnings = {{"none", ThinningMethod::none},
+                                           {"tbba", ThinningMethod::tbba},
+                                           {"multinomial", ThinningMethod::multinomial},
+                                           {"residual", ThinningMethod::residual},
+                                           {"stratified", ThinningMethod::stratified},
+                                           {"systematic", ThinningMethod::systematic},
+                                           {"recombination", ThinningMethod::recombination}};
+const Choices<SiteOrder> orders = {{"tree", SiteOrder::tree}, {"spatial", SiteOrder::spatial}};
+const Choices<PruneWeights> prunings = {{"likelihood", PruneWeights::likelihood},
+                                        {"cubature", PruneWeights::cubature}};
+const Choices<FunctionalMethod> functionals = {{"picard", FunctionalMethod::picard},
+                                               {"trapezoid", FunctionalMethod::trapezoid},
+                                               {"second-order", FunctionalMethod::second_order}};
+const Choices<FlowMethod> flows = {{"auto", FlowMethod::automatic},
+                                   {"exact", FlowMethod::exact},
+                                   {"explicit", FlowMethod::explicit_},
+                                   {"cvode", FlowMethod::cvode}};
+const Choices<OnNodeFailure> failures = {{"stop", OnNodeFailure::stop}, {"drop", OnNodeFailure::drop}};
+
+// An option given where it means nothing is a mistake worth telling.
+void refuse_if(bool given, const char* option, const std::string& reason) {
+  if (given) throw InputError(reason, option);
+}
+
+void refuse_tree_options(const FilterArguments& a, const std::string& reason) {
+  refuse_if(a.degree.has_value(), "--degree", reason);
+  refuse_if(a.formula.has_value(), "--formula", reason);
+  refuse_if(a.prune_weights.has_value(), "--prune-weights", reason);
+  refuse_if(a.recombination_degree.has_value(), "--recombination-degree", reason);
+  refuse_if(a.flow.has_value(), "--flow", reason);
+  refuse_if(a.relative_tolerance.has_value(), "--rtol", reason);
+  refuse_if(a.absolute_tolerance.has_value(), "--atol", reason);
+  refuse_if(a.on_node_failure.has_value(), "--on-node-failure", reason);
+}
+
+void refuse_random_options(const FilterArguments& a, const std::string& reason) {
+  refuse_if(a.launches.has_value(), "--launches", reason + ": it is deterministic");
+  refuse_if(a.seed.has_value(), "--seed", reason + ": it is deterministic");
+}
+
+void refuse_thinning_options(const FilterArguments& a, const std::string& reason) {
+  refuse_if(a.thin.has_value() && a.thin != ThinningMethod::none, "--thin", reason);
+  refuse_if(a.order.has_value(), "--order", reason);
+  refuse_if(a.prune_weights.has_value(), "--prune-weights", reason);
+  refuse_if(a.recombination_degree.has_value(), "--recombination-degree", reason);
+  refuse_random_options(a, reason);
+}
+
+void refuse_inapplicable(const FilterArguments& a, const Model& model, FilterMethod method,
+                         ThinningMethod thin) {
+  const std::string with_method = "has no meaning with --method " + name_of(methods, method);
+  const std::string with_thinning = "has no meaning with --thin " + name_of(thinnings, thin);
+  refuse_if(a.ess_threshold && method != FilterMethod::euler, "--ess-threshold", with_method);
+  refuse_if(a.functional && model.observation != ObservationKind::continuous, "--functional",
+            "has meaning only for continuous observations");
+  if (method == FilterMethod::euler) {
+    refuse_tree_options(a, with_method);
+    refuse_if(a.thin == ThinningMethod::recombination, "--thin",
+              "recombination " + with_method + ", which counts particles");
+    refuse_if(a.order && thin == ThinningMethod::none, "--order", with_thinning);
+    return;
+  }
+  if (!keeps_nodes(method)) {
+    refuse_tree_options(a, with_method);
+    refuse_thinning_options(a, with_method);
+    refuse_if(a.nodes && method != FilterMethod::grid, "--nodes", with_method);
+    refuse_if(a.functional.has_value(), "--functional", with_method);
+    refuse_if(a.threads.has_value(), "--threads", with_method);
+    return;
+  }
+  if (method == FilterMethod::full_tree) {
+    refuse_thinning_options(a, with_method);
+    refuse_if(a.nodes.has_value() && !model.initial_law, "--nodes", with_method + " and a fixed start");
+  } else if (thin == ThinningMethod::recombination) {
+    refuse_if(a.order.has_value(), "--order", with_thinning);
+    refuse_if(a.prune_weights == PruneWeights::cubature, "--thin recombination",
+              "merges states, and does not go with --prune-weights cubature");
+    refuse_random_options(a, with_thinning);
+  } else {
+    refuse_if(a.recombination_degree.has_value(), "--recombination-degree", with_thinning);
+  }
+  const std::string with_exact_flow = "has no meaning with --flow exact";
+  refuse_if(a.flow == FlowMethod::exact && a.relative_tolerance, "--rtol", with_exact_flow);
+  refuse_if(a.flow == FlowMethod::exact && a.absolute_tolerance, "--atol", with_exact_flow);
+}
+
+ThinningMethod thinning_of(const FilterArguments& a, FilterMethod method) {
+  // Recombination merges states, which a likelihood carried along each path does not allow.
+  const bool carried = a.prune_weights == PruneWeights::cubature;
+  if (method == FilterMethod::klv)
+    return a.thin.value_or(carried ? ThinningMethod::tbba : ThinningMethod::recombination);
+  if (method == FilterMethod::euler) return a.thin.value_or(ThinningMethod::systematic);
+  return ThinningMethod::none;
+}
+
+// Recombination needs few nodes, since it keeps moments; random thinning many.
+std::size_t default_nodes(FilterMethod method, ThinningMethod thin, std::size_t dimension) {
+  if (method == FilterMethod::grid) return FilterOptions{}.grid_points;
+  if (method == FilterMethod::euler) return 10000;
+  if (thin == ThinningMethod::recombination) return dimension == 1 ? 60 : dimension == 2 ? 300 : 600;
+  return dimension == 1 ? 1000 : 10000;
+}
+
+// Below this many nodes, threads wait for each other longer than they work.
+constexpr std::size_t nodes_worth_threads = 5000;
+
+}  // namespace
+
+void add_tree_options(CLI::App& app, FilterArguments& a) {
+  add_count(app, "--degree", a.degree, 1, "Degree of the cubature formula [5]", 99);
+  add_text(app, "--formula", a.formula, "NAME|FILE", "The cubature formula itself, instead of --degree");
+  add_count(app, "--nodes", a.nodes, 1,
+            "Nodes kept at each step, or cells of the grid [by method and dimension]", 1'000'000'000);
+  add_choice(app, "--thin", a.thin, thinnings, "How nodes are thinned out");
+  add_choice(app, "--order", a.order, orders, "Order in which random thinning visits nodes [spatial]");
+  add_count(app, "--recombination-degree", a.recombination_degree, 1,
+            "Moments that recombination keeps [by dimension]", 99);
+  add_choice(app, "--prune-weights", a.prune_weights, prunings,
+             "Weights that decide which nodes stay [likelihood]");
+  add_choice(app, "--functional", a.functional, functionals,
+             "Likelihood of a step of a continuous observation [second-order]");
+  add_choice(app, "--flow", a.flow, flows, "How nodes move along a path [auto]");
+  add_number(app, "--rtol", a.relative_tolerance, Sign::positive, "Relative tolerance of the flow [1e-8]");
+  add_number(app, "--atol", a.absolute_tolerance, Sign::positive, "Absolute tolerance of the flow [1e-10]");
+  add_choice(app, "--on-node-failure", a.on_node_failure, failures,
+             "A node that cannot be moved stops the run, or is dropped [stop]");
+  add_count(app, "--seed", a.seed, 0, "Seed of what is random [1]");
+  add_count(app, "--threads", a.threads, 1,
+            "Threads; results do not depend on them [1, or all for many nodes]", 1024);
+}
+
+void add_filter_options(CLI::App& app, FilterArguments& a) {
+  add_choice(app, "--method", a.method, methods, "The filter [klv]");
+  add_tree_options(app, a);
+  add_number(app, "--ess-threshold", a.ess_threshold, Sign::any,
+             "euler: resample when the effective sample size is at most this part of --nodes [1]");
+  add_count(app, "--launches", a.launches, 1, "Independent runs of a random method, averaged [1]", 1'000'000);
+}
+
+std::optional<FilterMethod> exact_method(const Model& model) {
+  switch (model.exact_filter) {
+    case ExactFilter::none:
+      return {};
+    case ExactFilter::benes:
+      return FilterMethod::benes;
+    case ExactFilter::kalman_bucy:
+      return FilterMethod::kalman_bucy;
+    case ExactFilter::kalman:
+      return FilterMethod::kalman;
+  }
+  return {};
+}
+
+std::string method_name(FilterMethod method) { return name_of(methods, method); }
+
+bool keeps_nodes(FilterMethod method) {
+  return method == FilterMethod::klv || method == FilterMethod::full_tree || method == FilterMethod::euler;
+}
+
+FilterSetup filter_setup(const FilterArguments& a, const Model& model) {
+  FilterSetup setup;
+  FilterOptions& o = setup.options;
+  o.method = a.method.value_or(FilterMethod::klv);
+  if (o.method == FilterMethod::klv && a.thin == ThinningMethod::none) o.method = FilterMethod::full_tree;
+  o.thinning.method = thinning_of(a, o.method);
+  refuse_inapplicable(a, model, o.method, o.thinning.method);
+  const std::size_t nodes =
+      a.nodes.value_or(default_nodes(o.method, o.thinning.method, model.reported_dimension()));
+  (o.method == FilterMethod::grid ? o.grid_points : o.nodes) = nodes;
+  if (!keeps_nodes(o.method)) return setup;
+  if (o.method != FilterMethod::euler)
+    o.formula = choose_formula(a.degree, a.formula, model.noise_dimension());
+  o.thinning.order = a.order.value_or(SiteOrder::spatial);
+  o.thinning.recombination_degree = static_cast<int>(a.recombination_degree.value_or(0));
+  o.prune_weights = a.prune_weights.value_or(PruneWeights::likelihood);
+  o.functional = a.functional.value_or(FunctionalMethod::second_order);
+  o.flow = a.flow.value_or(FlowMethod::automatic);
+  o.tolerance.relative = a.relative_tolerance.value_or(o.tolerance.relative);
+  o.tolerance.absolute = a.absolute_tolerance.value_or(o.tolerance.absolute);
+  o.on_node_failure = a.on_node_failure.value_or(OnNodeFailure::stop);
+  o.ess_threshold = a.ess_threshold.value_or(o.ess_threshold);
+  o.seed = a.seed.value_or(1);
+  const bool many = o.method == FilterMethod::full_tree || o.nodes >= nodes_worth_threads;
+  o.threads =
+      static_cast<unsigned>(a.threads.value_or(many ? std::max(1U, std::thread::hardware_concurrency()) : 1));
+  setup.launches = static_cast<std::uint32_t>(a.launches.value_or(1));
+  setup.random = o.method == FilterMethod::euler ||
+                 (o.method == FilterMethod::klv && o.thinning.method != ThinningMethod::recombination);
+  return setup;
+}
+
+Json options_in_force(const FilterSetup& setup, const Model& model) {
+  const FilterOptions& o = setup.options;
+  const bool tree = o.method == FilterMethod::klv || o.method == FilterMethod::full_tree;
+  Json json;
+  json["method"] = name_of(methods, o.method);
+  if (o.method == FilterMethod::grid) json["nodes"] = o.grid_points;
+  if (!keeps_nodes(o.method)) return json;
+  if (tree) {
+    json["degree"] = o.formula.degree;
+    json["formula"] = o.formula.name;
+  }
+  if (o.method != FilterMethod::full_tree) {
+    json["nodes"] = o.nodes;
+    json["thin"] = name_of(thinnings, o.thinning.method);
+    if (setup.random) json["order"] = name_of(orders, o.thinning.order);
+    if (o.thinning.recombination_degree > 0) json["recombination-degree"] = o.thinning.recombination_degree;
+  }
+  if (o.method == FilterMethod::klv) json["prune-weights"] = name_of(prunings, o.prune_weights);
+  if (o.method == FilterMethod::euler) json["ess-threshold"] = o.ess_threshold;
+  if (model.observation == ObservationKind::continuous)
+    json["functional"] = name_of(functionals, o.functional);
+  if (tree) {
+    json["flow"] = name_of(flows, o.flow);
+    json["rtol"] = o.tolerance.relative;
+    json["atol"] = o.tolerance.absolute;
+    json["on-node-failure"] = name_of(failures, o.on_node_failure);
+  }
+  if (setup.random) {
+    json["seed"] = o.seed;
+    json["launches"] = setup.launches;
+  }
+  return json;
+}
+
+std::string describe(const FilterSetup& setup) {
+  const FilterOptions& o = setup.options;
+  if (o.method == FilterMethod::grid) return fmt::format("grid filter, {} cells", o.nodes);
+  if (!keeps_nodes(o.method)) return "exact " + method_name(o.method) + " filter";
+  if (o.method == FilterMethod::full_tree) return fmt::format("full tree, degree {}", o.formula.degree);
+  const std::string nodes =
+      fmt::format("{} {} by {}", o.nodes, o.method == FilterMethod::euler ? "particles" : "nodes",
+                  name_of(thinnings, o.thinning.method));
+  if (o.method == FilterMethod::euler) return "Euler particle filter, " + nodes;
+  return fmt::format("KLV filter, degree {}, {}", o.formula.degree, nodes);
+}
+
+}  // namespace wienertree::app

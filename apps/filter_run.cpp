@@ -1,0 +1,106 @@
+#include "filter_run.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "progress.hpp"
+
+namespace wienertree::app {
+namespace {
+
+// The filters of one run, which take the same windows.
+class SideBySide {
+ public:
+  SideBySide(const Model& model, const FilterSetup& setup, const FilterRequest& request)
+      : model_(model), setup_(setup), request_(request), filter_(model, setup) {
+    const std::optional<FilterMethod> exact = exact_method(model);
+    if (exact && *exact != setup.options.method) exact_ = make_exact(model, *exact);
+    if (!request.density_at) return;
+    // The prior is the law without observations: by the exact filter where there is one.
+    Model unobserved = model;
+    unobserved.observation = ObservationKind::none;
+    prior_ = exact ? make_exact(unobserved, *exact) : make_filter(unobserved, setup.options);
+  }
+
+  void advance(const ObservationWindow& window) {
+    refuse_oversized_tree(model_, setup_.options, window.step);
+    filter_.advance(window);
+    if (exact_) exact_->advance(window);
+    if (prior_ && run_.density.empty()) prior_->advance(window);
+  }
+
+  void record(double time) {
+    filter_.summarise(time, request_.highest_moment, run_.rows.emplace_back());
+    if (exact_) {
+      summarise(exact_->posterior(), model_.reported_dimension(), 0, run_.exact.emplace_back());
+      run_.exact.back().time = time;
+    }
+    if (request_.observe) request_.observe(run_.rows.back());
+    // 1e-9 relative: a step that ends at the asked time up to rounding.
+    if (request_.density_at && run_.density.empty() &&
+        time >= *request_.density_at - 1e-9 * std::fabs(time)) {
+      run_.density_time = time;
+      const std::vector<std::string> states(
+          model_.state_names.begin(),
+          model_.state_names.begin() + static_cast<std::ptrdiff_t>(model_.reported_dimension()));
+      run_.density = density_panels(states, filter_.posterior(), exact_ ? &exact_->posterior() : nullptr,
+                                    &prior_->posterior());
+    }
+  }
+
+  FilterRun finish() {
+    run_.statistics = filter_.statistics();
+    return std::move(run_);
+  }
+
+ private:
+  static std::unique_ptr<Filter> make_exact(const Model& model, FilterMethod method) {
+    FilterOptions options;
+    options.method = method;
+    return make_filter(model, options);
+  }
+
+  const Model& model_;
+  const FilterSetup& setup_;
+  const FilterRequest& request_;
+  Launches filter_;
+  std::unique_ptr<Filter> exact_, prior_;
+  FilterRun run_;
+};
+
+void check_density_time(const FilterRequest& request, const WindowSource& windows) {
+  if (!request.density_at) return;
+  const double t = *request.density_at, slack = 1e-9 * std::fabs(t);
+  if (t < windows.start() - slack || (windows.end() && t > *windows.end() + slack))
+    throw InputError(windows.end() ? fmt::format("must be within the observations, {:g} .. {:g}",
+                                                 windows.start(), *windows.end())
+                                   : fmt::format("is before the first observation, at {:g}", windows.start()),
+                     "--density-at", fmt::format("{}", t));
+}
+
+}  // namespace
+
+FilterRun run_filter(const Model& model, const FilterSetup& setup, WindowSource& windows,
+                     const FilterRequest& request) {
+  check_density_time(request, windows);
+  refuse_oversized_tree(model, setup.options, windows.size());
+  SideBySide filters(model, setup, request);
+  if (!windows.observed_at_start()) filters.record(windows.start());
+  {
+    Progress progress("filter", windows.size(), request.progress);
+    for (ObservationWindow window; windows.next(window);) {
+      filters.advance(window);
+      filters.record(window.end);
+      progress.advance_to(window.step);
+    }
+  }
+  FilterRun run = filters.finish();
+  if (request.density_at && run.density.empty())
+    throw InputError("the observations end before this time", "--density-at",
+                     fmt::format("{}", *request.density_at));
+  return run;
+}
+
+}  // namespace wienertree::app

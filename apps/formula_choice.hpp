@@ -1,0 +1,17 @@
+#pragma once
+/// Which cubature formula a run uses.
+#include <cstdint>
+#include <optional>
+#include <string>
+
+#include "wienertree/cubature/formula.hpp"
+
+namespace wienertree::app {
+
+/// The formula named by --formula (a bundled name or a file), or else the best at hand of degree --degree, 5
+/// if not given. Its moments are verified.
+/// @throws InputError if both options are given, or there is no such formula
+CubatureFormula choose_formula(std::optional<std::uint64_t> degree, const std::optional<std::string>& formula,
+                               std::size_t noise_dimension);
+
+}  // namespace wienertree::app

@@ -1,0 +1,38 @@
+#pragma once
+/// Independent launches of one filter, side by side, and what they say together.
+#include <memory>
+#include <vector>
+
+#include "filter_arguments.hpp"
+#include "wienertree/filter/filter.hpp"
+
+namespace wienertree::app {
+
+/// What M launches say of one time.
+struct LaunchesSummary {
+  PosteriorSummary mean;  ///< averages over the launches; the evidence itself is averaged, not its logarithm
+  double nodes = 0;       ///< average
+  std::vector<double>
+      mean_sd;  ///< per component: standard deviation over the launches of the posterior mean; 0 for M = 1
+  double log_evidence_sd = 0;
+};
+
+class Launches {
+ public:
+  /// @throws InputError as make_filter
+  Launches(const Model& model, const FilterSetup& setup);
+  void advance(const ObservationWindow& window);
+  std::size_t size() const { return filters_.size(); }
+  /// The law of the first launch.
+  const Posterior& posterior() { return filters_.front()->posterior(); }
+  void summarise(double time, int highest_moment, LaunchesSummary& out);
+  /// Work of all launches together.
+  FilterStatistics statistics() const;
+
+ private:
+  std::size_t components_;
+  std::vector<std::unique_ptr<Filter>> filters_;
+  std::vector<PosteriorSummary> summaries_;
+};
+
+}  // namespace wienertree::app

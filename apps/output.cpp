@@ -1,0 +1,156 @@
+#include "output.hpp"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <array>
+#include <atomic>
+#include <cerrno>
+#include <csignal>
+#include <cstdio>
+#include <cstring>
+#include <filesystem>
+#include <system_error>
+
+#include "wienertree/model/error.hpp"
+
+namespace wienertree::app {
+namespace {
+
+namespace fs = std::filesystem;
+
+std::string reason(int error) { return std::generic_category().message(error); }
+
+// Names that a signal handler may have to remove: fixed buffers, since a handler may not allocate.
+struct TemporaryName {
+  std::atomic<bool> taken{false}, complete{false};
+  std::array<char, 4096> name{};
+};
+std::array<TemporaryName, 4> temporaries;
+
+void remember(const std::string& name) {
+  for (TemporaryName& t : temporaries) {
+    if (name.size() >= t.name.size() || t.taken.exchange(true)) continue;
+    std::memcpy(t.name.data(), name.c_str(), name.size() + 1);
+    t.complete = true;
+    return;
+  }
+}
+
+void forget(const std::string& name) {
+  for (TemporaryName& t : temporaries)
+    if (t.complete && name == t.name.data()) {
+      t.complete = false;
+      t.taken = false;
+    }
+}
+
+extern "C" void remove_temporaries(int signal) {
+  for (TemporaryName& t : temporaries)
+    if (t.complete) ::unlink(t.name.data());
+  std::signal(signal, SIG_DFL);
+  ::raise(signal);
+}
+
+// 0, or errno of the write that failed. A short write is continued.
+int write_all(int file, std::string_view content) {
+  while (!content.empty()) {
+    const ssize_t written = ::write(file, content.data(), content.size());
+    if (written < 0 && errno == EINTR) continue;
+    if (written < 0) return errno;
+    content.remove_prefix(static_cast<std::size_t>(written));
+  }
+  return 0;
+}
+
+}  // namespace
+
+OutputFile::OutputFile(std::string option, const std::string& target)
+    : option_(std::move(option)), target_(target) {
+  if (target == "-") {
+    direct_ = true;
+    return;
+  }
+  const auto refuse = [&](const std::string& message) { throw InputError(message, option_, target_); };
+  if (target.empty()) refuse("a file name is needed");
+  std::error_code failure;
+  // Through links, so that the file they point to is replaced and not the link.
+  if (const fs::path resolved = fs::weakly_canonical(fs::absolute(target), failure); !failure)
+    target_ = resolved.string();
+  struct stat status {};
+  if (::stat(target_.c_str(), &status) == 0) {
+    if (S_ISDIR(status.st_mode)) refuse("is a directory");
+    if (::access(target_.c_str(), W_OK) != 0) refuse("cannot be written: " + reason(errno));
+    direct_ = !S_ISREG(status.st_mode);
+    mode_ = status.st_mode & 07777U;
+  }
+  if (direct_) return;
+  const fs::path directory = fs::path(target_).parent_path();
+  if (!fs::is_directory(directory, failure)) refuse("there is no such directory");
+  if (::access(directory.c_str(), W_OK | X_OK) != 0)
+    refuse("its directory cannot be written: " + reason(errno));
+}
+
+OutputFile::~OutputFile() {
+  if (temporary_.empty()) return;
+  ::unlink(temporary_.c_str());
+  forget(temporary_);
+}
+
+void OutputFile::stage(std::string content) {
+  if (direct_) {
+    direct_content_ = std::move(content);
+    return;
+  }
+  const auto fail = [&](int error) {
+    throw RunError("cannot be written: " + reason(error), option_, target_);
+  };
+  const fs::path path(target_);
+  const std::string name =
+      (path.parent_path() / fmt::format(".{}.{}.tmp", path.filename().string(), ::getpid())).string();
+  const int file = ::open(name.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
+  if (file < 0) fail(errno);
+  temporary_ = name;
+  remember(temporary_);
+  int error = write_all(file, content);
+  if (error == 0 && mode_ != 0 && ::fchmod(file, mode_) != 0) error = errno;
+  // Some file systems report a full disk only when asked to keep the bytes.
+  if (error == 0 && ::fsync(file) != 0 && errno != EINVAL) error = errno;
+  if (::close(file) != 0 && error == 0) error = errno;
+  if (error != 0) fail(error);
+}
+
+void OutputFile::publish() {
+  const auto fail = [&](int error) {
+    throw RunError("cannot be written: " + reason(error), option_, target_);
+  };
+  if (target_ == "-") {
+    write_to_stdout(direct_content_);
+  } else if (direct_) {
+    const int file = ::open(target_.c_str(), O_WRONLY | O_CLOEXEC);
+    if (file < 0) fail(errno);
+    const int error = write_all(file, direct_content_);
+    if (::close(file) != 0 || error != 0) fail(error != 0 ? error : errno);
+  } else {
+    if (std::rename(temporary_.c_str(), target_.c_str()) != 0) fail(errno);
+    forget(temporary_);
+    temporary_.clear();
+  }
+}
+
+void write_to_stdout(std::string_view content) {
+  const int error = write_all(STDOUT_FILENO, content);
+  if (error == EPIPE) throw BrokenPipe();
+  if (error != 0) throw RunError("cannot be written: " + reason(error), "standard output");
+}
+
+void install_signal_handlers() {
+  std::signal(SIGPIPE, SIG_IGN);
+  std::signal(SIGXFSZ, SIG_IGN);
+  std::signal(SIGINT, remove_temporaries);
+  std::signal(SIGTERM, remove_temporaries);
+}
+
+}  // namespace wienertree::app

@@ -1,0 +1,122 @@
+#include "window_source.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <iostream>
+#include <limits>
+#include <vector>
+
+namespace wienertree::app {
+namespace {
+
+class RecordedWindows final : public WindowSource {
+ public:
+  RecordedWindows(ObservationPath path, const Model& model, std::optional<std::size_t> steps)
+      : path_(std::move(path)),
+        windows_(path_, model.observation, model.timing, steps.value_or(default_steps(model.observation))),
+        inner_rows_(model.observation == ObservationKind::continuous && windows_.size() < path_.rows() - 1) {}
+
+  bool next(ObservationWindow& window) override {
+    if (done_ == windows_.size()) return false;
+    windows_.get(done_++, window);
+    return true;
+  }
+  double start() const override { return windows_.start(); }
+  bool observed_at_start() const override {
+    return windows_.size() > 0 && windows_.time(0) == windows_.start();
+  }
+  std::optional<double> end() const override { return windows_.end(); }
+  std::size_t size() const override { return windows_.size(); }
+  std::size_t rows() const override { return path_.rows(); }
+  bool has_inner_rows() const override { return inner_rows_; }
+  bool streams() const override { return false; }
+
+ private:
+  // Continuous: a step a row, or fewer where rows abound. Discrete: a step a row, or several where rows are
+  // few.
+  std::size_t default_steps(ObservationKind kind) const {
+    const std::size_t gaps = path_.rows() - 1;
+    if (kind == ObservationKind::continuous) return std::min(gaps, usual_steps);
+    return gaps * std::max<std::size_t>(1, gaps == 0 ? 1 : (usual_steps + gaps / 2) / gaps);
+  }
+
+  ObservationPath path_;
+  ObservationWindows windows_;
+  bool inner_rows_;
+  std::size_t done_ = 0;
+};
+
+class StreamedWindows final : public WindowSource {
+ public:
+  explicit StreamedWindows(const Model& model)
+      : kind_(model.observation),
+        timing_(model.timing),
+        reader_(std::cin, "standard input", model.observation_dimension(), model.observation),
+        value_(model.observation_dimension()) {
+    if (!reader_.next(time_, value_)) throw InputError("no rows after the header", "standard input");
+    start_ = time_;
+    rows_ = 1;
+    pair_.dimension = value_.size();
+    pair_.append(time_, value_);
+    if (kind_ == ObservationKind::discrete)
+      observed_at_start_ = ObservationWindows(pair_, kind_, timing_, 0).size() > 0;
+  }
+
+  bool next(ObservationWindow& window) override {
+    if (steps_ == 0 && observed_at_start_) return get(ObservationWindows(pair_, kind_, timing_, 0), window);
+    if (!reader_.next(time_, value_)) {
+      if (rows_ == 1 && kind_ == ObservationKind::continuous)
+        throw InputError("a continuous observation needs at least two rows", "standard input");
+      return false;
+    }
+    ++rows_;
+    if (pair_.rows() == 2) {
+      pair_.times.erase(pair_.times.begin());
+      pair_.values.erase(pair_.values.begin(),
+                         pair_.values.begin() + static_cast<std::ptrdiff_t>(value_.size()));
+    }
+    // The row before has been weighed by: as the start of this pair its discrete observation is missing.
+    if (kind_ == ObservationKind::discrete)
+      std::fill(pair_.values.begin(), pair_.values.end(), std::numeric_limits<double>::quiet_NaN());
+    pair_.append(time_, value_);
+    return get(ObservationWindows(pair_, kind_, timing_, 0), window);
+  }
+  double start() const override { return start_; }
+  bool observed_at_start() const override { return observed_at_start_; }
+  std::optional<double> end() const override { return {}; }
+  std::size_t size() const override { return 0; }
+  std::size_t rows() const override { return rows_; }
+  bool has_inner_rows() const override { return false; }
+  bool streams() const override { return true; }
+
+ private:
+  bool get(const ObservationWindows& windows, ObservationWindow& window) {
+    windows.get(0, window);
+    window.step = ++steps_;
+    return true;
+  }
+
+  ObservationKind kind_;
+  ObservationTiming timing_;
+  ObservationReader reader_;
+  std::vector<double> value_;
+  ObservationPath pair_;
+  double time_ = 0, start_ = 0;
+  std::size_t rows_ = 0, steps_ = 0;
+  bool observed_at_start_ = false;
+};
+
+}  // namespace
+
+std::unique_ptr<WindowSource> open_windows(const std::string& observations, const Model& model,
+                                           std::optional<std::size_t> steps) {
+  if (observations != "-")
+    return std::make_unique<RecordedWindows>(
+        read_observations(observations, model.observation_dimension(), model.observation), model, steps);
+  if (steps)
+    throw InputError("needs the whole record; with --observations - every row ends a step", "--steps",
+                     std::to_string(*steps));
+  return std::make_unique<StreamedWindows>(model);
+}
+
+}  // namespace wienertree::app

@@ -1,0 +1,38 @@
+#pragma once
+/// Observation windows from a file, or from standard input row by row.
+#include <cstddef>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "wienertree/filter/window.hpp"
+
+namespace wienertree::app {
+
+/// One window after the other.
+class WindowSource {
+ public:
+  virtual ~WindowSource() = default;
+  /// The next window, or false at the end. What it refers to is valid until the next call.
+  /// @throws InputError for a row that cannot be read
+  virtual bool next(ObservationWindow& window) = 0;
+  virtual double start() const = 0;
+  /// Whether the first window has length zero: an observation at the start.
+  virtual bool observed_at_start() const = 0;
+  virtual std::optional<double> end() const = 0;  ///< of the last window, where it is known beforehand
+  virtual std::size_t size() const = 0;           ///< number of windows, 0 where it is not known beforehand
+  virtual std::size_t rows() const = 0;           ///< read so far
+  /// Whether a window has rows strictly inside, from which the second-order functional differs from the
+  /// trapezoid.
+  virtual bool has_inner_rows() const = 0;
+  virtual bool streams() const = 0;
+};
+
+/// "-" is standard input, where every row ends a window; else a file, cut into `steps` windows. Without
+/// `steps`: at least `usual_steps` where the rows allow it, no more than needed for one a row.
+/// @throws InputError for a file that cannot be read, steps that do not fit it, or steps with standard input
+inline constexpr std::size_t usual_steps = 200;
+std::unique_ptr<WindowSource> open_windows(const std::string& observations, const Model& model,
+                                           std::optional<std::size_t> steps);
+
+}  // namespace wienertree::app

@@ -1,0 +1,114 @@
+#include "wienertree/tree/recombination_space.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numeric>
+
+#include "wienertree/tree/recombination.hpp"
+#include "wienertree/tree/recombination_vectors.hpp"
+
+namespace wienertree::recombination {
+
+void SpaceRecombination::reduce(ConstBatchView x, std::span<const double> log_weight, int degree,
+                                std::size_t budget, KeptPoints& out) {
+  out.point.clear();
+  out.log_weight.clear();
+  out.discarded = 0;
+  const double largest = *std::max_element(log_weight.begin(), log_weight.end());
+  partition_.reset(x.components(), x.nodes());
+  for (std::size_t i = 0; i < x.components(); ++i)
+    std::copy(x.component(i).begin(), x.component(i).end(), partition_.component(i).begin());
+  const double total = relative_weights(log_weight.data(), largest, x.nodes(), partition_.weight().data());
+  partition_.cut(degree, moment_number(x.components(), degree, budget), budget);
+  for (const Patch& patch : partition_.patches()) reduce_patch(patch, log_weight, degree, largest, out);
+  out.discarded /= total;
+}
+
+void SpaceRecombination::reduce_patch(const Patch& patch, std::span<const double> log_weight, int degree,
+                                      double largest, KeptPoints& out) {
+  const auto order = partition_.order().subspan(patch.begin, patch.size());
+  const std::size_t d = partition_.dimension(), q = moment_number(d, degree, patch.size());
+  if (patch.size() <= q) {
+    for (const std::uint32_t j : order) {
+      out.point.push_back(j);
+      out.log_weight.push_back(log_weight[j]);
+    }
+    return;
+  }
+  // Weights relative to the patch's heaviest: a patch in the tail is reduced as well as any other.
+  patch_log_weight_.resize(patch.size());
+  for (std::size_t t = 0; t < order.size(); ++t) patch_log_weight_[t] = log_weight[order[t]];
+  const double heaviest = *std::max_element(patch_log_weight_.begin(), patch_log_weight_.end());
+  points_.reserve(d, patch.size());
+  const double weight =
+      relative_weights(patch_log_weight_.data(), heaviest, patch.size(), points_.weight.data());
+  std::size_t n = 0;
+  for (std::size_t t = 0; t < order.size(); ++t) {
+    points_.weight[n] = points_.weight[t];
+    points_.label[n] = static_cast<std::uint32_t>(t);
+    n += points_.weight[n] > 0 ? 1 : 0;
+  }
+  points_.count = n;
+  fill_box(patch);
+  double change = 0;
+  if (points_.dimension == 0 || degree == 0)
+    change = keep_nearest_to_mean(weight);
+  else
+    change = caratheodory_.reduce(basis(points_.dimension, degree), points_);
+  out.discarded += change * weight * std::exp(heaviest - largest);
+  for (std::size_t j = 0; j < points_.count; ++j) {
+    out.point.push_back(order[points_.label[j]]);
+    out.log_weight.push_back(heaviest + std::log(points_.weight[j]));
+  }
+}
+
+/// The patch's components become coordinates on [-1,1]; those that are constant are left out.
+void SpaceRecombination::fill_box(const Patch& patch) {
+  std::size_t varying = 0;
+  for (std::size_t i = 0; i < partition_.dimension(); ++i) {
+    const std::span<const double> x = partition_.component(i).subspan(patch.begin, patch.size());
+    const std::span<double> z(points_.z.data() + varying * points_.stride, points_.count);
+    for (std::size_t j = 0; j < z.size(); ++j) z[j] = x[points_.label[j]];
+    const auto [low, high] = std::minmax_element(z.begin(), z.end());
+    const double half = *high / 2 - *low / 2, centre = *low + half;
+    if (!(half > 0)) continue;
+    for (double& value : z) value = std::clamp((value - centre) / half, -1.0, 1.0);
+    ++varying;
+  }
+  points_.dimension = varying;
+}
+
+/// Degree 0. @return the l1 change of the mean
+double SpaceRecombination::keep_nearest_to_mean(double weight) {
+  const std::size_t d = points_.dimension, n = points_.count;
+  const auto z = [&](std::size_t i, std::size_t j) -> double& { return points_.z[i * points_.stride + j]; };
+  for (std::size_t i = 0; i < d; ++i) {
+    double mean = 0;
+    for (std::size_t j = 0; j < n; ++j) mean += points_.weight[j] * z(i, j);
+    for (std::size_t j = 0; j < n; ++j) z(i, j) -= mean / weight;
+  }
+  std::size_t nearest = 0;
+  double least = std::numeric_limits<double>::infinity();
+  for (std::size_t j = 0; j < n; ++j) {
+    double square = 0;
+    for (std::size_t i = 0; i < d; ++i) square += z(i, j) * z(i, j);
+    if (square < least) least = square, nearest = j;
+  }
+  double change = 0;
+  for (std::size_t i = 0; i < d; ++i) change += std::abs(z(i, nearest));
+  points_.label[0] = points_.label[nearest];
+  points_.weight[0] = weight;
+  points_.count = 1;
+  return change;
+}
+
+const PolynomialBasis& SpaceRecombination::basis(std::size_t dimension, int degree) {
+  if (degree != basis_degree_) basis_.clear();
+  basis_degree_ = degree;
+  if (basis_.size() <= dimension) basis_.resize(dimension + 1);
+  if (!basis_[dimension]) basis_[dimension] = std::make_unique<PolynomialBasis>(dimension, degree);
+  return *basis_[dimension];
+}
+
+}  // namespace wienertree::recombination

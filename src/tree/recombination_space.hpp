@@ -1,0 +1,43 @@
+#pragma once
+/// Recombination where several components vary: Caratheodory reductions of the patches of a k-d tree.
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "wienertree/model/batch.hpp"
+#include "wienertree/tree/recombination_caratheodory.hpp"
+#include "wienertree/tree/recombination_partition.hpp"
+
+namespace wienertree::recombination {
+
+struct KeptPoints {
+  std::vector<std::uint32_t> point;  ///< patch by patch, ascending within a patch's order
+  std::vector<double> log_weight;    ///< one per point
+  double discarded = 0;              ///< as Selection::discarded
+};
+
+class SpaceRecombination {
+ public:
+  /// @param x components that vary, d >= 2 x n;  log_weight n values > -infinity;  n > budget
+  /// @param degree r >= 0 with (d + r choose r) <= budget; r = 0 keeps the point nearest to a patch's mean
+  void reduce(ConstBatchView x, std::span<const double> log_weight, int degree, std::size_t budget,
+              KeptPoints& out);
+
+ private:
+  void reduce_patch(const Patch& patch, std::span<const double> log_weight, int degree, double largest,
+                    KeptPoints& out);
+  void fill_box(const Patch& patch);
+  double keep_nearest_to_mean(double weight);
+  const PolynomialBasis& basis(std::size_t dimension, int degree);
+
+  SpacePartition partition_;
+  Caratheodory caratheodory_;
+  PatchPoints points_;
+  std::vector<double> patch_log_weight_;
+  std::vector<std::unique_ptr<PolynomialBasis>> basis_;  ///< by dimension, all of degree basis_degree_
+  int basis_degree_ = -1;
+};
+
+}  // namespace wienertree::recombination

@@ -1,0 +1,14 @@
+#include "wienertree/tree/recombination_vectors.hpp"
+
+#include "wienertree/tree/clones.hpp"
+#include "wienertree/tree/elementary.hpp"
+
+namespace wienertree::recombination {
+
+WIENERTREE_CLONES double relative_weights(const double* log_weight, double largest, std::size_t n,
+                                          double* w) {
+  for (std::size_t i = 0; i < n; ++i) w[i] = elementary::exp_nonpositive(log_weight[i] - largest);
+  return lane_sum(0, n, [&](std::size_t i) { return w[i]; });
+}
+
+}  // namespace wienertree::recombination

@@ -1,0 +1,62 @@
+#pragma once
+/// Runs the program `wienertree` as its users do, in a directory of its own.
+#include <filesystem>
+#include <map>
+#include <string>
+#include <vector>
+
+namespace cli {
+
+/// How a run ended and what it said.
+struct Outcome {
+  int code = -1;   ///< exit code, -1 if a signal ended it
+  int signal = 0;  ///< 0 if none did
+  std::string out, err;
+};
+
+/// A directory that goes with the object.
+class Workplace {
+ public:
+  Workplace();
+  ~Workplace();
+  Workplace(const Workplace&) = delete;
+  Workplace& operator=(const Workplace&) = delete;
+  const std::filesystem::path& directory() const { return directory_; }
+
+  void write(const std::string& name, const std::string& content) const;
+  std::string read(const std::string& name) const;
+  std::vector<std::string> files() const;  ///< names, sorted
+
+  std::map<std::string, std::string> environment;  ///< set in addition to the test's own
+  std::string input;                               ///< standard input
+  std::string stdout_to;                           ///< a file, or "closed pipe"; empty: captured
+  unsigned long largest_file = 0;                  ///< bytes a file may have, 0 for any
+
+  /// Runs the program with these arguments, split at spaces.
+  Outcome run(const std::string& arguments) const;
+
+ private:
+  std::filesystem::path directory_;
+};
+
+std::vector<std::string> lines_of(const std::string& text);
+
+/// A CSV table by column.
+class Columns {
+ public:
+  explicit Columns(const std::string& csv);
+  const std::vector<std::string>& names() const { return names_; }
+  bool has(const std::string& name) const { return values_.contains(name); }
+  /// @throws std::out_of_range if there is no such column
+  const std::vector<double>& operator[](const std::string& name) const { return values_.at(name); }
+  std::size_t rows() const { return values_.at(names_.front()).size(); }
+
+ private:
+  std::vector<std::string> names_;
+  std::map<std::string, std::vector<double>> values_;
+};
+
+/// 400 rows of benes on [0, 4], seed 3, as Y.csv, with the signal as X.csv.
+void simulate_benes(const Workplace& workplace);
+
+}  // namespace cli
