@@ -304,6 +304,23 @@ TEST_CASE("Without thinning every site of positive weight stays as it is") {
   }
 }
 
+TEST_CASE("Every method is made under its name, deterministic or not") {
+  const std::pair<ThinningMethod, std::string_view> names[] = {
+      {ThinningMethod::none, "none"},
+      {ThinningMethod::tbba, "tbba"},
+      {ThinningMethod::residual, "residual"},
+      {ThinningMethod::multinomial, "multinomial"},
+      {ThinningMethod::stratified, "stratified"},
+      {ThinningMethod::systematic, "systematic"},
+      {ThinningMethod::recombination, "recombination"}};
+  for (const auto& [method, name] : names) {
+    const auto thinning = make_thinning({.method = method});
+    CHECK(thinning->name() == name);
+    CHECK(thinning->deterministic() ==
+          (method == ThinningMethod::none || method == ThinningMethod::recombination));
+  }
+}
+
 TEST_CASE("Measures that cannot be thinned are refused") {
   for_every_method([&](Thinning& thinning, ThinningMethod, SiteOrder order) {
     Selection s;
