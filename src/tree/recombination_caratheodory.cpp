@@ -33,6 +33,12 @@ WIENERTREE_CLONES void divide_by_first(double* moments, std::size_t groups, std:
   for (std::size_t g = 0; g < groups; ++g) moments[g] = 1;
 }
 
+WIENERTREE_CLONES void scale_rows(double* rows, std::size_t groups, std::size_t stride,
+                                  std::span<const double> factor) {
+  for (std::size_t f = 0; f < factor.size(); ++f)
+    for (std::size_t g = 0; g < groups; ++g) rows[f * stride + g] *= factor[f];
+}
+
 }  // namespace
 
 void PatchPoints::reserve(std::size_t d, std::size_t most) {
@@ -43,8 +49,10 @@ void PatchPoints::reserve(std::size_t d, std::size_t most) {
   if (label.size() < most) label.resize(most);
 }
 
-double Caratheodory::reduce(const PolynomialBasis& basis, PatchPoints& points) {
-  assert(basis.dimension() == points.dimension && points.count >= 1);
+double Caratheodory::reduce(const PolynomialBasis& basis, std::span<const double> importance,
+                            PatchPoints& points) {
+  assert(basis.dimension() == points.dimension && points.count >= 1 &&
+         importance.size() == basis.size() - basis.kept());
   const std::size_t q = basis.kept(), further = basis.size() - q;
   const auto total_weight = [&] {
     return std::accumulate(points.weight.begin(),
@@ -60,6 +68,7 @@ double Caratheodory::reduce(const PolynomialBasis& basis, PatchPoints& points) {
     group_moments(basis, points, groups);
     weight_.assign(moments_.begin(), moments_.begin() + static_cast<std::ptrdiff_t>(groups));
     divide_by_first(moments_.data(), groups, basis.size(), padded(groups));
+    scale_rows(moments_.data() + q * padded(groups), groups, padded(groups), importance);
     before_ = weight_;
     step_.reduce(moments_.data(), groups, q, basis.size(), weight_, discrepancy_);
     const std::size_t before = points.count;

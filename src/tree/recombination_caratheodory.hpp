@@ -30,9 +30,11 @@ class Caratheodory {
   /// Keeps at most basis.kept() of the points, in their order, with new weights: the same integrals of the
   /// basis' kept polynomials. Points of less than 1e-300 times the total weight may go; the total is
   /// restored.
-  /// @return l1 change of the integrals of the polynomials of the first degree not kept, for total weight 1
+  /// @param importance weights, one for every polynomial of the first degree not kept, for what to disturb
+  /// least
+  /// @return sum of the changes of those polynomials' integrals times their weights, for total weight 1
   /// @pre basis.dimension() == points.dimension, points.count >= 1, weights about 1 at most
-  double reduce(const PolynomialBasis& basis, PatchPoints& points);
+  double reduce(const PolynomialBasis& basis, std::span<const double> importance, PatchPoints& points);
 
  private:
   void group_moments(const PolynomialBasis& basis, const PatchPoints& points, std::size_t groups);

@@ -84,8 +84,7 @@ void DiscreteGauss::recurrence(std::span<const double> z, std::span<const double
       first_change_ = 0;
       return;
     }
-    const auto two_k = static_cast<double>(2 * k);
-    first_change_ *= beta * beta * ((2 * two_k + 1) * (2 * two_k + 3)) / ((two_k + 1) * (two_k + 2));
+    first_change_ *= beta * beta;
     if (count_ < s) divide(vectors_.data() + count_ * stride, beta, stride);
   }
 }

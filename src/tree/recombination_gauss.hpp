@@ -25,8 +25,8 @@ class DiscreteGauss {
   std::span<const double> nodes() const { return {diagonal_.data(), count_}; }
   std::span<const double> weights() const { return {first_.data(), count_}; }
 
-  /// integral of P_{2s} (Legendre) against the points less that against the nodes, for total weight 1:
-  /// prod_{k=1..s} beta_k^2 times the leading coefficient (4s)! / (2^{2s} (2s)!^2); 0 when the nodes are
+  /// Integral of z^{2s} against the points less that against the nodes, for total weight 1: that of the
+  /// square of the monic orthogonal polynomial of degree s, prod_{k=1..s} beta_k^2. 0 when the nodes are
   /// exact.
   double first_change() const { return first_change_; }
 

@@ -47,6 +47,7 @@ class LineRecombination {
                     std::size_t nodes, LineNodes& out);
 
   DiscreteGauss gauss_;
+  double deviation_ = 0;
   std::vector<double> cumulative_, z_, weight_;
   std::vector<std::size_t> begin_;
 };

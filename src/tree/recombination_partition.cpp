@@ -21,10 +21,6 @@ WIENERTREE_CLONES double weighted_total(const double* w, const double* z, std::s
   return lane_sum(0, n, [&](std::size_t j) { return w[j] * z[j]; });
 }
 
-WIENERTREE_CLONES double weighted_square(const double* w, const double* z, double mean, std::size_t n) {
-  return lane_sum(0, n, [&](std::size_t j) { return w[j] * ((z[j] - mean) * (z[j] - mean)); });
-}
-
 // square[j] becomes square[j]^(power/2), power >= 1.
 [[gnu::always_inline]] inline void half_powers(double* square, std::size_t n, int power) {
   std::array<double, block> base;
@@ -91,11 +87,9 @@ void SpacePartition::reset(std::size_t dimension, std::size_t points) {
 }
 
 void SpacePartition::scale() {
-  const double mass = total(weight_.data(), points_);
   for (std::size_t i = 0; i < dimension_; ++i) {
     const std::span<double> z = component(i);
-    const double mean = weighted_total(weight_.data(), z.data(), points_) / mass;
-    const double deviation = std::sqrt(weighted_square(weight_.data(), z.data(), mean, points_) / mass);
+    const auto [mean, deviation] = mean_deviation(z.data(), weight_.data(), points_);
     const double factor = deviation > 0 ? 1 / deviation : 0;
     for (double& x : z) x = (x - mean) * factor;
   }

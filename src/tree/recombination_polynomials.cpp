@@ -55,6 +55,19 @@ PolynomialBasis::PolynomialBasis(std::size_t dimension, int degree)
   }
 }
 
+void PolynomialBasis::taylor_weights(std::span<const double> half, std::vector<double>& out) const {
+  assert(half.size() == dimension_);
+  out.resize(size() - kept_);
+  for (std::size_t a = kept_; a < size(); ++a) {
+    double weight = 1;
+    for (std::size_t b = a; b != 0; b = factor_[b].parent) {
+      const std::size_t i = factor_[b].row / table_rows_, power = factor_[b].row % table_rows_;
+      for (std::size_t k = 1; k <= power; ++k) weight *= half[i] / static_cast<double>(2 * k - 1);
+    }
+    out[a - kept_] = weight;
+  }
+}
+
 void PolynomialBasis::evaluate(const double* z, std::size_t stride, const double* w, std::size_t n,
                                double* scratch, double* out) const {
   assert(n <= block);

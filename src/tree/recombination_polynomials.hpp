@@ -24,6 +24,14 @@ class PolynomialBasis {
   std::size_t kept() const { return kept_; }
   std::size_t size() const { return factor_.size(); }
 
+  /// The weight of a change of the integral of P_a, |a| = r + 1, in the error of a smooth function on a box
+  /// of half widths `half`: lower moments being kept, the leading term of Taylor's series leaves
+  ///
+  ///     d^a f / a! times the change of the integral of (x - centre)^a,
+  ///
+  /// which is that of P_a times  half^a / prod_i (2 a_i - 1)!!  times d^a f. One value for every such a.
+  void taylor_weights(std::span<const double> half, std::vector<double>& out) const;
+
   static constexpr std::size_t block = 64;  ///< points evaluated at a time at most
   /// Doubles of scratch that `evaluate` wants.
   std::size_t scratch_size() const { return dimension_ * table_rows_ * block; }

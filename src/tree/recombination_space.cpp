@@ -54,8 +54,11 @@ void SpaceRecombination::reduce_patch(const Patch& patch, std::span<const double
   double change = 0;
   if (points_.dimension == 0 || degree == 0)
     change = keep_nearest_to_mean(weight);
-  else
-    change = caratheodory_.reduce(basis(points_.dimension, degree), points_);
+  else {
+    const PolynomialBasis& polynomials = basis(points_.dimension, degree);
+    polynomials.taylor_weights({half_.data(), points_.dimension}, importance_);
+    change = caratheodory_.reduce(polynomials, importance_, points_);
+  }
   out.discarded += change * weight * std::exp(heaviest - largest);
   for (std::size_t j = 0; j < points_.count; ++j) {
     out.point.push_back(order[points_.label[j]]);
@@ -66,6 +69,7 @@ void SpaceRecombination::reduce_patch(const Patch& patch, std::span<const double
 /// The patch's components become coordinates on [-1,1]; those that are constant are left out.
 void SpaceRecombination::fill_box(const Patch& patch) {
   std::size_t varying = 0;
+  half_.resize(partition_.dimension());
   for (std::size_t i = 0; i < partition_.dimension(); ++i) {
     const std::span<const double> x = partition_.component(i).subspan(patch.begin, patch.size());
     const std::span<double> z(points_.z.data() + varying * points_.stride, points_.count);
@@ -74,12 +78,12 @@ void SpaceRecombination::fill_box(const Patch& patch) {
     const double half = *high / 2 - *low / 2, centre = *low + half;
     if (!(half > 0)) continue;
     for (double& value : z) value = std::clamp((value - centre) / half, -1.0, 1.0);
-    ++varying;
+    half_[varying++] = half;
   }
   points_.dimension = varying;
 }
 
-/// Degree 0. @return the l1 change of the mean
+/// Degree 0. @return the l1 change of the mean, in the units of the partition
 double SpaceRecombination::keep_nearest_to_mean(double weight) {
   const std::size_t d = points_.dimension, n = points_.count;
   const auto z = [&](std::size_t i, std::size_t j) -> double& { return points_.z[i * points_.stride + j]; };
@@ -96,7 +100,7 @@ double SpaceRecombination::keep_nearest_to_mean(double weight) {
     if (square < least) least = square, nearest = j;
   }
   double change = 0;
-  for (std::size_t i = 0; i < d; ++i) change += std::abs(z(i, nearest));
+  for (std::size_t i = 0; i < d; ++i) change += half_[i] * std::abs(z(i, nearest));
   points_.label[0] = points_.label[nearest];
   points_.weight[0] = weight;
   points_.count = 1;

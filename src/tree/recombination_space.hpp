@@ -36,6 +36,7 @@ class SpaceRecombination {
   Caratheodory caratheodory_;
   PatchPoints points_;
   std::vector<double> patch_log_weight_;
+  std::vector<double> half_, importance_;  ///< of the patch's box, in standard deviations; Taylor weights
   std::vector<std::unique_ptr<PolynomialBasis>> basis_;  ///< by dimension, all of degree basis_degree_
   int basis_degree_ = -1;
 };

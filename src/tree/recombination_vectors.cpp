@@ -1,5 +1,7 @@
 #include "wienertree/tree/recombination_vectors.hpp"
 
+#include <cmath>
+
 #include "wienertree/tree/clones.hpp"
 #include "wienertree/tree/elementary.hpp"
 
@@ -9,6 +11,13 @@ WIENERTREE_CLONES double relative_weights(const double* log_weight, double large
                                           double* w) {
   for (std::size_t i = 0; i < n; ++i) w[i] = elementary::exp_nonpositive(log_weight[i] - largest);
   return lane_sum(0, n, [&](std::size_t i) { return w[i]; });
+}
+
+WIENERTREE_CLONES MeanDeviation mean_deviation(const double* x, const double* w, std::size_t n) {
+  const double mass = lane_sum(0, n, [&](std::size_t i) { return w[i]; });
+  const double mean = lane_sum(0, n, [&](std::size_t i) { return w[i] * x[i]; }) / mass;
+  const double square = lane_sum(0, n, [&](std::size_t i) { return w[i] * ((x[i] - mean) * (x[i] - mean)); });
+  return {mean, std::sqrt(square / mass)};
 }
 
 }  // namespace wienertree::recombination

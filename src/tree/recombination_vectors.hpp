@@ -41,6 +41,12 @@ using Four [[gnu::vector_size(32), gnu::aligned(8), gnu::may_alias]] = double;
 /// w_i = exp(log_weight_i - largest), 0 below exp(-700); returns their sum. @pre largest >= log_weight_i
 double relative_weights(const double* log_weight, double largest, std::size_t n, double* w);
 
+/// Mean and standard deviation under weights w_i >= 0 of positive sum; two passes.
+struct MeanDeviation {
+  double mean, deviation;
+};
+MeanDeviation mean_deviation(const double* x, const double* w, std::size_t n);
+
 /// sum_i term(i), i = first..last-1
 template <class Term>
 [[gnu::always_inline]] inline double lane_sum(std::size_t first, std::size_t last, Term term) {

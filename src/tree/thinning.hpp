@@ -23,9 +23,11 @@ struct Selection {
   std::vector<std::uint32_t> site;   ///< ascending in the order the method visited them; no site twice
   std::vector<double> log_weight;    ///< one per kept site
   std::vector<std::uint32_t> count;  ///< particles per kept site for the methods that count; empty otherwise
-  /// Deterministic methods: what was discarded, sum over patches of mass times the l1 change of the moments
-  /// of the first degree that is not kept, in patch coordinates, relative to the total mass. 0 for random
-  /// methods.
+  /// Deterministic methods: an estimate of the error of this thinning. Lower moments being kept, the integral
+  /// of a smooth f changes at first order by sum_a d^a f / a! times the change of the moments of the first
+  /// degree that is not kept; this is the sum over patches of the |changes| / a!, in standard deviations of
+  /// the whole measure and relative to its mass: the change for an f whose derivatives of that degree are 1
+  /// per standard deviation. 0 for random methods.
   double discarded = 0;
   /// d x (kept sites), column n the state of the n-th kept site, when the method places nodes anew (Gauss
   /// reduction, d = 1); 0 nodes when the sites keep their own states. `site` then names a site next to the
