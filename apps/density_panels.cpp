@@ -24,22 +24,21 @@ Interval bulk(const Posterior& posterior, std::size_t i) {
   return {q[0] - margin, q[1] + margin};
 }
 
-std::size_t bins_for(const Posterior& posterior) {
-  const double n = effective_sample_size(posterior);
-  return static_cast<std::size_t>(std::clamp(2 * std::cbrt(n) + 6, 8.0, 60.0));
+// Particles: about as many bins as their number allows to tell apart. Smooth laws: as many as the eye does.
+std::size_t bins_for(const Posterior& posterior, const Marginal& law) {
+  if (law.has_density()) return 48;
+  return static_cast<std::size_t>(std::clamp(2 * std::cbrt(effective_sample_size(posterior)) + 6, 8.0, 60.0));
 }
 
 Histogram histogram(const Posterior& posterior, std::size_t i) {
   const Interval range = bulk(posterior, i);
-  const std::size_t bins = posterior.dirac() ? bins_for(posterior) : 60;
   const Marginal law(posterior, i);
+  const std::size_t bins = bins_for(posterior, law);
+  const double width = (range.high - range.low) / static_cast<double>(bins);
   Histogram h;
-  for (std::size_t b = 0; b <= bins; ++b)
-    h.edges.push_back(range.low +
-                      (range.high - range.low) * static_cast<double>(b) / static_cast<double>(bins));
+  for (std::size_t b = 0; b <= bins; ++b) h.edges.push_back(range.low + width * static_cast<double>(b));
   for (std::size_t b = 0; b < bins; ++b)
-    h.heights.push_back((law.distribution(h.edges[b + 1]) - law.distribution(h.edges[b])) /
-                        (h.edges[b + 1] - h.edges[b]));
+    h.heights.push_back((law.distribution(h.edges[b + 1]) - law.distribution(h.edges[b])) / width);
   return h;
 }
 
@@ -58,10 +57,14 @@ bool smooth(const Posterior& posterior, std::size_t i) {
   return !posterior.dirac() && posterior.variance_of(i, 0) > 0;
 }
 
+// Nodes of next to no weight, which a tree keeps in its tails, would hide those that carry the law.
 std::vector<double> rug_of(const Posterior& posterior, std::size_t i) {
+  constexpr double least_weight = 1e-6;
   std::vector<double> ticks;
   const std::size_t stride = 1 + posterior.size() / most_ticks_of_a_rug;
-  for (std::size_t n = 0; n < posterior.size(); n += stride) ticks.push_back(posterior.points(i, n));
+  for (std::size_t n = 0; n < posterior.size(); n += stride)
+    if (posterior.weight[n] >= least_weight / static_cast<double>(stride))
+      ticks.push_back(posterior.points(i, n));
   return ticks;
 }
 

@@ -17,8 +17,8 @@ struct Histogram {
 
 struct DensityPanel {
   std::string state;
-  Histogram nodes;          ///< of the weighted nodes of the filter, or of a smooth posterior's probabilities
-  std::vector<double> rug;  ///< where the nodes are
+  Histogram nodes;             ///< probabilities of the filter
+  std::vector<double> rug;     ///< where the nodes are
   std::optional<Curve> exact;  ///< exact posterior density
   std::optional<Curve> prior;  ///< exact prior density, where there is one
   std::optional<Histogram> prior_nodes;

@@ -9,7 +9,7 @@
 namespace wienertree::app {
 namespace {
 
-constexpr int width = 860, title_height = 44, panel_height = 250, axis_height = 52;
+constexpr int width = 860, title_height = 44, axis_height = 52;
 constexpr std::size_t points_a_curve =
     1500;  // more than a screen has; longer curves are drawn by every k-th point
 
@@ -79,7 +79,7 @@ std::string labels_of(const PosteriorPanel& panel, const Range& range, double sp
   return labels_at_right(std::move(labels), spacing);
 }
 
-void draw_panel(Picture& picture, const PosteriorPanel& panel, std::size_t number) {
+void draw_panel(Picture& picture, const PosteriorPanel& panel, std::size_t number, int panel_height) {
   const Range range = range_of(panel);
   picture.add(fmt::format("set yrange [{:.9g}:{:.9g}]\nset ylabel {} noenhanced", range.low, range.high,
                           quoted(panel.state)));
@@ -96,7 +96,7 @@ void draw_panel(Picture& picture, const PosteriorPanel& panel, std::size_t numbe
     add_curves(picture, id + "exact",
                {&panel.exact->time, &panel.exact->low, &panel.exact->high, &panel.exact->mean});
     for (const int column : {2, 3, 4})
-      plot += fmt::format(", ${}exact using 1:{} with lines lw {} dashtype (6,5) lc rgb \"{}\"", id, column,
+      plot += fmt::format(", ${}exact using 1:{} with lines lw {} dashtype (9,6) lc rgb \"{}\"", id, column,
                           column == 4 ? 1.2 : 0.8, colour::black);
   }
   picture.add(plot);
@@ -112,7 +112,7 @@ double nearest_value(const Curve& curve, double x) {
 
 std::string draw_posterior(Picture picture, const std::string& title,
                            const std::vector<PosteriorPanel>& panels) {
-  const int count = static_cast<int>(panels.size());
+  const int count = static_cast<int>(panels.size()), panel_height = count == 1 ? 320 : 250;
   const int height = title_height + count * panel_height + axis_height;
   picture.begin(width, height);
   picture.add(fmt::format("set multiplot\nset label 1 {} at screen 0.5,{:.4f} center noenhanced",
@@ -130,7 +130,7 @@ std::string draw_posterior(Picture picture, const std::string& title,
     if (i > 0) picture.add("unset label");
     PosteriorPanel panel = panels[static_cast<std::size_t>(i)];
     if (panel.signal) panel.signal = within(*panel.signal, time.front(), time.back());
-    draw_panel(picture, panel, static_cast<std::size_t>(i));
+    draw_panel(picture, panel, static_cast<std::size_t>(i), panel_height);
   }
   picture.add("unset multiplot");
   return picture.draw();

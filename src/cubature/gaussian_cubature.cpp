@@ -122,22 +122,20 @@ GaussianCubature axes_and_orthogonal_array(int p) {
   const std::vector<unsigned> rows = orthogonal_array(p);
   const double r2 = (p + 2) / 2.0, s2 = (p + 2.0) / (p - 2.0);
   const auto n = static_cast<Index>(rows.size());
+  const Index axes = Index{2} * p;
   GaussianCubature rule;
   rule.source =
-      fmt::format("Stroud (1971), E_n^r2 5-3, over an orthogonal array (Victoir 2004), {} points", 2 * p + n);
-  rule.points = Eigen::MatrixXd::Zero(p, 2 * p + n);
-  rule.weights.resize(2 * p + n);
-  for (int i = 0; i < p; ++i) {
-    rule.points(i, 2 * i) = std::sqrt(r2);
-    rule.points(i, 2 * i + 1) = -std::sqrt(r2);
-  }
-  rule.weights.head(2 * p).setConstant(1 / (r2 * r2));
+      fmt::format("Stroud (1971), E_n^r2 5-3, over an orthogonal array (Victoir 2004), {} points", axes + n);
+  rule.points = Eigen::MatrixXd::Zero(p, axes + n);
+  for (Index k = 0; k < axes; ++k) rule.points(k / 2, k) = k % 2 == 0 ? std::sqrt(r2) : -std::sqrt(r2);
   for (Index k = 0; k < n; ++k) {
     for (int i = 0; i < p; ++i) {
       const bool up = (rows[static_cast<std::size_t>(k)] >> i) & 1U;
-      rule.points(i, 2 * p + k) = up ? std::sqrt(s2) : -std::sqrt(s2);
+      rule.points(i, axes + k) = up ? std::sqrt(s2) : -std::sqrt(s2);
     }
   }
+  rule.weights.resize(axes + n);
+  rule.weights.head(axes).setConstant(1 / (r2 * r2));
   rule.weights.tail(n).setConstant(1 / (s2 * s2 * static_cast<double>(n)));
   return rule;
 }

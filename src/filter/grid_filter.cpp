@@ -194,9 +194,9 @@ void GridFilter::multiply(double factor, double noise, const ObservationWindow& 
     total += rho[n] *= ratio;
     errors += noise * ratio;
   }
-  if (!std::isfinite(reference) || !(total > 0))
+  if (!std::isfinite(reference) || std::isnan(errors))
     throw RunError("the observation has no likelihood", place_and_observation(window));
-  if (!(errors <= tolerated * total))
+  if (!(std::isfinite(errors) && errors <= tolerated * total))
     throw RunError("the observation lies where the density is below rounding errors",
                    place_and_observation(window));
   const double mass = density_.mass();

@@ -52,8 +52,8 @@ std::vector<FlowCase> make_cases() {
                             {{0.05, 0.3, -0.3}, {0.5, -1.2, 1.2}, {0.0, 1.0, 0.0}}));
   cases.push_back(
       make_case("Lorenz", Lorenz{}, {5.0, 5.0, 20.0}, 70, 5.0, {{0.01, 0.17}, {0.1, -0.5}, {0.2, 1.0}}));
-  cases.push_back(make_case("stiff relaxation", Stiff{}, {0.5, 0.5}, 20, 0.5, {{0.1, 0.5}, {0.5, -0.5}}));
-  cases.push_back(make_case("Van der Pol", VanDerPol{}, {2.0, 0.0}, 10, 0.3, {{0.5, 1.0}, {2.0, -1.0}}));
+  cases.push_back(make_case("stiff relaxation", Stiff{}, {0.5, 0.5}, 8, 0.5, {{0.1, 0.5}, {0.3, -0.5}}));
+  cases.push_back(make_case("Van der Pol", VanDerPol{}, {2.0, 0.0}, 6, 0.3, {{0.2, 1.0}, {0.5, -1.0}}));
   return cases;
 }
 

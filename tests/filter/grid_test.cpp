@@ -129,6 +129,30 @@ TEST_CASE(
   }
 }
 
+TEST_CASE("grid filter: the same problem in bent coordinates") {
+  // dX = -X dt + 0.7 dB, h = 2x, as Z = sinh X: dZ = (-X cosh X + 0.245 sinh X) dt + 0.7 cosh X dB, h = 2
+  // asinh z. The evidence is a number of the problem, not of its coordinates, and E[asinh Z] = E[X].
+  const std::string asinh = "log(x + sqrt(x^2 + 1))";
+  const Model straight = scalar("-x", "0.7", seen),
+              bent = scalar("-" + asinh + "*sqrt(x^2 + 1) + 0.245*x", "\"0.7*sqrt(x^2 + 1)\"",
+                            "[observation]\nkind = \"continuous\"\nh = [\"2*" + asinh + "\"]\n",
+                            "{ initial = 0.30452029344714261 }");
+  const auto path = simulate(straight, 2, 4000, 400, 5).observations;
+  const auto filter = make_filter(bent, defaults);
+  KalmanBucyFilter exact(straight);
+  for (Filter* f : {filter.get(), static_cast<Filter*>(&exact)})
+    run(*f, ObservationWindows(path, bent.observation, bent.timing, 0), {});
+  const Posterior& p = filter->posterior();
+  double mean_x = 0;  // of each Gaussian to fourth order: E f = f + w^2/2 f'' + w^4/8 f'''', f = asinh
+  for (std::size_t n = 0; n < p.size(); ++n) {
+    const double z = p.points(0, n), w2 = p.variance_of(0, n), r = 1 + z * z;
+    mean_x += p.weight[n] * (std::asinh(z) - w2 / 2 * z / std::pow(r, 1.5) +
+                             w2 * w2 / 8 * (9 * z - 6 * z * z * z) / std::pow(r, 3.5));
+  }
+  CHECK(p.log_evidence == Approx(exact.posterior().log_evidence).margin(1e-7));
+  CHECK(mean_x == Approx(mean(exact.posterior(), 0)).margin(1e-7));
+}
+
 TEST_CASE("grid filter: the prior law of Benes' problem A, its moments and its density") {
   Model model = benes_cases[0].model();
   model.observation = ObservationKind::none;
@@ -211,6 +235,59 @@ TEST_CASE("grid filter: discrete observations of a linear signal are the Kalman 
         CHECK(e.evidence < 1e-8);
       }
     }
+}
+
+TEST_CASE("grid filter: noise that is not Gaussian, against quadrature of the transition density") {
+  // X_{t+1} = X_t + N(0, 0.3), X_0 ~ N(0, 2). Trapezoidal sums on [-25, 25] with spacing 1/40: exact to
+  // rounding for Student's t, whose density is analytic; Laplace's kink lies on a node.
+  const std::vector<double> y = {0.4, -1.5, 6.0, 0.2, 0.3};
+  const auto log_likelihood = [&](auto log_density) {
+    constexpr int n = 2001;
+    const auto node = [](int i) { return (i - 1000) / 40.0; };
+    const auto normal = [](double x, double v) {
+      return std::exp(-x * x / (2 * v)) / std::sqrt(2 * std::numbers::pi * v);
+    };
+    std::vector<double> rho(n), next(n);
+    for (int i = 0; i < n; ++i) rho[i] = normal(node(i), 2) * std::exp(log_density(y[0] - node(i)));
+    for (std::size_t t = 1; t < y.size(); ++t) {
+      for (int i = 0; i < n; ++i) {
+        next[i] = 0;
+        for (int j = std::max(0, i - 200); j < std::min(n, i + 201); ++j)
+          next[i] += rho[j] * normal(node(i) - node(j), 0.3) / 40;
+        next[i] *= std::exp(log_density(y[t] - node(i)));
+      }
+      rho.swap(next);
+    }
+    double sum = 0;
+    for (const double r : rho) sum += r / 40;
+    return std::log(sum);
+  };
+  const auto filtered = [&](const std::string& noise, std::size_t points) {
+    Model model = scalar("0", "\"sqrt(0.3)\"",
+                         "[observation]\nkind = \"discrete\"\nh = [\"x\"]\nnoise = " + noise + "\n");
+    model.initial_law = InitialLaw{Eigen::VectorXd::Zero(1), Eigen::MatrixXd::Constant(1, 1, 2.0)};
+    const ObservationPath path{1, {0, 1, 2, 3, 4}, y};
+    FilterOptions options = defaults;
+    options.grid_points = points;
+    const auto filter = make_filter(model, options);
+    double variance = 0;
+    run(*filter, ObservationWindows(path, model.observation, model.timing, 0),
+        [&](const Posterior& p) { variance = std::max(variance, p.variance_of(0, 0)); });
+    return std::pair(filter->posterior().log_evidence, variance);
+  };
+  // Student's t with 4 degrees of freedom and scale 0.7: density 3/8 (1 + v^2/(4 s^2))^{-5/2} / s.
+  CHECK(filtered("{ law = \"student-t\", dof = 4, scale = 0.7 }", 400).first ==
+        Approx(log_likelihood([](double v) {
+          return std::log(0.375 / 0.7) - 2.5 * std::log1p(v * v / (4 * 0.49));
+        })).margin(1e-8));
+  const double laplace = log_likelihood([](double v) { return -std::abs(v) / 0.5; });
+  // A kink in a cell of width w costs the sum at most w^2/12 times the jump of the derivative, 2/0.5 times
+  // the density there, which is about the integral itself: w^2/3 for each of the five observations.
+  for (const std::size_t points : {400, 1600}) {
+    const auto [evidence, variance] = filtered("{ law = \"laplace\", scale = 0.5 }", points);
+    CHECK(evidence == Approx(laplace).margin(5 * variance / 3));
+    CHECK(5 * variance / 3 < (points == 400 ? 1.6e-2 : 1e-3));
+  }
 }
 
 TEST_CASE("grid filter: a likelihood ten thousand times as narrow as the prior") {

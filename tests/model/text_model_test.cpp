@@ -119,6 +119,9 @@ TEST_CASE("exact filters are found without being claimed") {
   CHECK(exact("a*b*tanh(a*b*x)", "a", continuous_x) == ExactFilter::none);
   CHECK(exact("a*b*tanh(b*x/a + 0.0001)", "a", continuous_x) == ExactFilter::none);
   CHECK(exact("max(a*b*tanh(b*x/a), -100)", "a", continuous_x) == ExactFilter::none);
+  std::string bounded = one_state("-x", "a", continuous_x);
+  bounded.replace(bounded.find("{ initial = 0.3 }"), 17, "{ initial = 0.3, lower = -9 }");
+  CHECK(parse_model(bounded, "bounded.toml").exact_filter == ExactFilter::none);
 }
 
 TEST_CASE("Benes parameters of a model with negative sigma are those of its law") {
