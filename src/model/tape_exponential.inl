@@ -1,5 +1,6 @@
-// exp and tanh for machine codes with a fused multiply-add, of WIENERTREE_VECTOR, `fused` and WIENERTREE_INTRINSIC as in
-// tape_machine_x86.inl. libmvec's tanh looks its polynomials up in a table, lane by lane, and takes three times as long.
+// exp and tanh for machine codes with a fused multiply-add, of WIENERTREE_VECTOR, `fused` and
+// WIENERTREE_INTRINSIC as in tape_machine_x86.inl. libmvec's tanh looks its polynomials up in a table, lane
+// by lane, and takes three times as long.
 //
 // With n the integer nearest to x/ln 2 and r = x - n ln 2, |r| <= ln(2)/2 = 0.3466,
 //
@@ -9,8 +10,9 @@
 //
 //   tanh(x) = sign(x) m/(m + 2),     m = exp(y) - 1 = 2^n (r + r^2 q(r)) + (2^n - 1)
 //
-// where nothing cancels: n = 0 gives m = r + r^2 q(r), and for n >= 1 m >= 0.41. (W. J. Cody, W. Waite 1980, Software
-// Manual for the Elementary Functions, chapters 6 and 13.) Errors: exp 1, tanh 2.5 units in the last place.
+// where nothing cancels: n = 0 gives m = r + r^2 q(r), and for n >= 1 m >= 0.41. (W. J. Cody, W. Waite 1980,
+// Software Manual for the Elementary Functions, chapters 6 and 13.) Errors: exp 1, tanh 2.5 units in the last
+// place.
 
 namespace wienertree {
 namespace {
@@ -43,7 +45,8 @@ WIENERTREE_VECTOR reduced_exponential(WIENERTREE_VECTOR r) {
   return fused(fused(fused(q8, r4, q4), r4, q0), r2, r);
 }
 
-/// The value nearest to x in [lower, upper]; NaN where x is NaN, for the processor gives its second operand then.
+/// The value nearest to x in [lower, upper]; NaN where x is NaN, for the processor gives its second operand
+/// then.
 WIENERTREE_VECTOR limited(double lower, double upper, WIENERTREE_VECTOR x) {
   return WIENERTREE_INTRINSIC(max_pd)(all(lower), WIENERTREE_INTRINSIC(min_pd)(all(upper), x));
 }
@@ -52,7 +55,8 @@ constexpr double log2_e = 0x1.71547652b82fep0;
 
 WIENERTREE_VECTOR vector_exp(WIENERTREE_VECTOR x) {
   x = limited(-746.0, 710.0, x);  // beyond, 0 and infinity
-  // 2^n in two factors, n/2 each: n reaches 1024 above and -1076 below, where only the last product may round.
+  // 2^n in two factors, n/2 each: n reaches 1024 above and -1076 below, where only the last product may
+  // round.
   const WIENERTREE_VECTOR n = fused(x, all(log2_e), all(integer_shift)) - all(integer_shift);
   const WIENERTREE_VECTOR half = fused(n, all(0.5), all(integer_shift));
   const WIENERTREE_VECTOR rest = (n - (half - all(integer_shift))) + all(integer_shift);

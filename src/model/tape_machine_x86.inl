@@ -1,8 +1,8 @@
 // What the x86-64 machine codes have in common: `Machine` for tape_kernel.inl. The including file defines
 // WIENERTREE_VECTOR (__m256d, say), WIENERTREE_INTRINSIC(name) (_mm256_name), WIENERTREE_LIBMVEC_1(name) and
-// WIENERTREE_LIBMVEC_2(name) (the functions of one and two arguments of glibc's libmvec, by their names in the x86-64
-// vector function ABI: _ZGV, instruction set, N for unmasked, width, a v for each argument), WIENERTREE_EXP(x) and
-// WIENERTREE_TANH(x), and the functions
+// WIENERTREE_LIBMVEC_2(name) (the functions of one and two arguments of glibc's libmvec, by their names in
+// the x86-64 vector function ABI: _ZGV, instruction set, N for unmasked, width, a v for each argument),
+// WIENERTREE_EXP(x) and WIENERTREE_TANH(x), and the functions
 //
 //   fused(a, b, c)      a b + c, in one rounding where the machine can
 //   nan_of(a, result)   a where a is NaN, else result
@@ -11,9 +11,10 @@
 
 extern "C" {
 #define X(name) __attribute__((const)) WIENERTREE_VECTOR WIENERTREE_LIBMVEC_1(name)(WIENERTREE_VECTOR);
-X(exp) X(log) X(sin) X(cos) X(tan) X(sinh) X(cosh) X(tanh) X(atan) X(erf) X(erfc)
+X(exp)
+X(log) X(sin) X(cos) X(tan) X(sinh) X(cosh) X(tanh) X(atan) X(erf) X(erfc)
 #undef X
-__attribute__((const)) WIENERTREE_VECTOR WIENERTREE_LIBMVEC_2(pow)(WIENERTREE_VECTOR, WIENERTREE_VECTOR);
+    __attribute__((const)) WIENERTREE_VECTOR WIENERTREE_LIBMVEC_2(pow)(WIENERTREE_VECTOR, WIENERTREE_VECTOR);
 }
 
 namespace wienertree {
