@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "wienertree/filter/places.hpp"
 #include "wienertree/tree/initial.hpp"
@@ -13,14 +14,6 @@ namespace {
 
 constexpr std::size_t block = 1024;  // particles whose arrays stay in cache; even, as normals come in pairs
 
-template <class Body>
-void for_blocks(ThreadPool& pool, std::size_t N, Body body) {
-  pool.for_each((N + block - 1) / block, [&](std::size_t task, std::size_t) {
-    const std::size_t first = task * block;
-    body(first, std::min(block, N - first));
-  });
-}
-
 }  // namespace
 
 EulerFilter::EulerFilter(const Model& model, const FilterOptions& options)
@@ -29,130 +22,144 @@ EulerFilter::EulerFilter(const Model& model, const FilterOptions& options)
       functional_(make_functional(options.functional)),
       thinning_(options.thinning.method == ThinningMethod::none ? nullptr : make_thinning(options.thinning)),
       pool_(options.threads),
+      scratch_(pool_.size()),
       kept_(options.nodes) {
-  const std::size_t N = options_.nodes, d = model_.state_dimension();
+  const std::size_t N = options_.nodes;
   const RandomStream random{options_.seed, options_.launch, 0, Purpose::initial_state};
   draw_initial(model_, random, N, x_);
-  next_.reshape(d, N);
-  noise_.reshape(model_.noise_dimension(), N);
+  next_.reshape(model_.state_dimension(), N);
   log_weight_.assign(N, -std::log(static_cast<double>(N)));
-  term_.resize(N);
-  normalised_.assign(log_weight_, {}, "start");
 }
 
 void EulerFilter::advance(const ObservationWindow& window) {
   resample_if_due(window);
-  weigh_at_start(window);
-  if (window.length() > 0) {
-    move(window);
-    weigh_at_end(window);
-  }
+  pool_.for_each((x_.nodes() + block - 1) / block, [&](std::size_t task, std::size_t thread) {
+    const std::size_t first = task * block;
+    step(window, first, std::min(block, x_.nodes() - first), scratch_[thread]);
+  });
+  if (window.length() > 0) x_.swap(next_);
+  weighed_ = weighed_ || model_.observation == ObservationKind::continuous || !window.observation.empty();
+  check_log_weights(log_weight_, window);
+  stale_ = true;
   ++statistics_.steps;
   statistics_.children += options_.nodes;
   time_ = window.end;
-  normalised_.assign(log_weight_, {}, place(window));
 }
 
 // Before the step, so that the posterior reported for the last one was that of the weighted particles.
 void EulerFilter::resample_if_due(const ObservationWindow& window) {
   kept_ = options_.nodes;
-  if (!thinning_ || !weighed_ ||
-      normalised_.effective_size > options_.ess_threshold * static_cast<double>(options_.nodes))
-    return;
+  if (!thinning_ || !weighed_) return;
+  const auto N = static_cast<double>(options_.nodes);
+  if (options_.ess_threshold < 1) {
+    normalise();
+    if (normalised_.effective_size > options_.ess_threshold * N) return;
+  }
   const RandomStream random{options_.seed, options_.launch, static_cast<std::uint32_t>(window.step),
                             Purpose::thinning};
   thinning_->thin({x_, log_weight_, 0}, options_.nodes, random, selection_);
+  const std::size_t kept = selection_.site.size();
   for (std::size_t i = 0; i < x_.components(); ++i) {
     const double* from = x_.component(i).data();
     double* to = next_.component(i).data();
-    for (std::size_t s = 0; s < selection_.site.size(); ++s)
-      to = std::fill_n(to, selection_.count[s], from[selection_.site[s]]);
+    double* const end = to + next_.nodes();
+    // Two copies at once: most particles have one child or two, which branching would have to guess.
+    for (std::size_t s = 0; s < kept; ++s) {
+      const double x = from[selection_.site[s]];
+      const std::uint32_t children = selection_.count[s];
+      to[0] = x;
+      to[to + 1 < end ? 1 : 0] = x;
+      if (children > 2) std::fill_n(to, children, x);
+      to += children;
+    }
   }
   x_.swap(next_);
-  std::fill(log_weight_.begin(), log_weight_.end(),
-            normalised_.log_mass - std::log(static_cast<double>(options_.nodes)));
-  kept_ = selection_.site.size();
+  // A site of o particles weighs o times a particle.
+  const double particle = selection_.log_weight[0] - std::log(static_cast<double>(selection_.count[0]));
+  std::fill(log_weight_.begin(), log_weight_.end(), particle);
+  kept_ = kept;
   weighed_ = false;
 }
 
-void EulerFilter::weigh_at_start(const ObservationWindow& window) {
-  const bool here = window.at_start || window.length() == 0;
-  if (model_.observation == ObservationKind::discrete && here && !window.observation.empty()) {
-    model_.density->log_density(window.observation, x_, term_);
-    for (std::size_t n = 0; n < term_.size(); ++n) log_weight_[n] += term_[n];
-    weighed_ = true;
-  }
-  if (model_.observation != ObservationKind::continuous) return;
+// One block through the whole step, so that it passes through memory once.
+void EulerFilter::step(const ObservationWindow& window, std::size_t first, std::size_t count,
+                       Scratch& scratch) {
+  const auto x = x_.view().nodes(first, count), next = next_.view().nodes(first, count);
+  const std::span<double> log_weight = {log_weight_.data() + first, count};
+  const bool discrete = model_.observation == ObservationKind::discrete && !window.observation.empty(),
+             continuous = model_.observation == ObservationKind::continuous,
+             at_start = window.at_start || window.length() == 0;
   const std::size_t k = model_.fields->sensor_dimension(), p = model_.noise_dimension();
-  sensor_.reshape(k, x_.nodes());
-  derivative_.reshape(functional_->uses_derivative() ? k * p : 0, x_.nodes());
-  for_blocks(pool_, x_.nodes(), [&](std::size_t first, std::size_t count) {
-    const auto x = x_.view().nodes(first, count);
-    const auto h = sensor_.view().nodes(first, count);
-    BatchView G;
-    model_.fields->sensor(x, h);
-    if (functional_->uses_derivative())
-      model_.fields->sensor_derivative(x, G = derivative_.view().nodes(first, count));
-    const std::span<double> term = {term_.data() + first, count};
-    functional_->at_start(window, h, G, term);
-    for (std::size_t n = 0; n < count; ++n) log_weight_[first + n] += term[n];
-  });
-  weighed_ = true;
+  scratch.term.resize(block);
+  const std::span<double> term = {scratch.term.data(), count};
+  const auto add_term = [&] {
+    for (std::size_t n = 0; n < count; ++n) log_weight[n] += term[n];
+  };
+  const auto add_density = [&](ConstBatchView at) {
+    model_.density->log_density(window.observation, at, term);
+    add_term();
+  };
+  if (discrete && at_start) add_density(x);
+  if (continuous) {
+    scratch.sensor.reshape(k, count);
+    scratch.derivative.reshape(functional_->uses_derivative() ? k * p : 0, count);
+    model_.fields->sensor(x, scratch.sensor);
+    if (functional_->uses_derivative()) model_.fields->sensor_derivative(x, scratch.derivative);
+    functional_->at_start(window, scratch.sensor, scratch.derivative, term);
+    add_term();
+  }
+  if (!(window.length() > 0)) return;
+  move(window, first, x, next, scratch);
+  if (discrete && !at_start) add_density(next);
+  if (continuous && functional_->uses_end()) {
+    scratch.end_sensor.reshape(k, count);
+    model_.fields->sensor(next, scratch.end_sensor);
+    functional_->at_end(window, scratch.sensor, scratch.end_sensor, log_weight);
+  }
 }
 
-void EulerFilter::move(const ObservationWindow& window) {
+void EulerFilter::move(const ObservationWindow& window, std::size_t first, ConstBatchView x, BatchView next,
+                       Scratch& scratch) const {
   const double s = window.length(), root = std::sqrt(s);
-  const std::size_t p = noise_.components(), N = x_.nodes();
+  const std::size_t N = x_.nodes();
   const RandomStream random{options_.seed, options_.launch, static_cast<std::uint32_t>(window.step),
                             Purpose::euler_noise};
-  for_blocks(pool_, N, [&](std::size_t first, std::size_t count) {
-    const auto dB = noise_.view().nodes(first, count);
-    // Component r of particle n is draw r * 2 ceil(N/2) + n: blocks start at even draws, whatever N.
-    for (std::size_t r = 0; r < p; ++r) {
-      const std::span<double> z = dB.component(r);
-      random.normals(r * (N + N % 2) + first, z);
-      for (double& v : z) v *= root;
-    }
-    model_.fields->euler_step(x_.view().nodes(first, count), s, dB, next_.view().nodes(first, count));
-  });
-  x_.swap(next_);
-  keep_inside_bounds(window);
+  scratch.noise.reshape(model_.noise_dimension(), x.nodes());
+  // Component r of particle n is draw r * 2 ceil(N/2) + n: blocks start at even draws, whatever N.
+  for (std::size_t r = 0; r < scratch.noise.components(); ++r) {
+    const std::span<double> z = scratch.noise.component(r);
+    random.normals(r * (N + N % 2) + first, z);
+    for (double& v : z) v *= root;
+  }
+  model_.fields->euler_step(x, s, scratch.noise, next);
+  for (std::size_t i = 0; i < next.components(); ++i) keep_inside_bounds(window, i, first, next.component(i));
 }
 
-void EulerFilter::keep_inside_bounds(const ObservationWindow& window) {
-  for (std::size_t i = 0; i < model_.state_dimension(); ++i) {
-    const StateBound& b = model_.bounds[i];
-    const std::span<double> x = x_.component(i);
-    if (b.bounded() && b.boundary != Boundary::error) {
-      for (double& v : x) v = v < b.lower ? b.lower : v > b.upper ? b.upper : v;  // NaN stays
-    }
-    for (std::size_t n = 0; n < x.size(); ++n)
-      if (!(std::isfinite(x[n]) && x[n] >= b.lower && x[n] <= b.upper))
-        throw RunError(
-            std::isfinite(x[n]) ? "a particle left the state's bounds" : "a particle's state is not finite",
-            fmt::format("{}, particle {}, state {}", place(window), n, model_.state_names[i]),
-            fmt::format("{}", x[n]));
-  }
+void EulerFilter::keep_inside_bounds(const ObservationWindow& window, std::size_t i, std::size_t first,
+                                     std::span<double> x) const {
+  constexpr double largest = std::numeric_limits<double>::max();
+  const StateBound& b = model_.bounds[i];
+  if (b.bounded() && b.boundary != Boundary::error)
+    for (double& v : x) v = v < b.lower ? b.lower : v > b.upper ? b.upper : v;  // NaN stays
+  const double lower = std::max(b.lower, -largest), upper = std::min(b.upper, largest);
+  const auto inside = [&](double v) { return (v >= lower) & (v <= upper); };
+  std::uint64_t outside = 0;
+  for (const double v : x) outside |= inside(v) ? 0 : 1;
+  if (outside == 0) return;
+  const auto n = static_cast<std::size_t>(std::find_if_not(x.begin(), x.end(), inside) - x.begin());
+  throw RunError(
+      std::isfinite(x[n]) ? "a particle left the state's bounds" : "a particle's state is not finite",
+      fmt::format("{}, particle {}, state {}", place(window), first + n, model_.state_names[i]),
+      fmt::format("{}", x[n]));
 }
 
-void EulerFilter::weigh_at_end(const ObservationWindow& window) {
-  if (model_.observation == ObservationKind::discrete) {
-    if (window.at_start || window.observation.empty()) return;
-    model_.density->log_density(window.observation, x_, term_);
-    for (std::size_t n = 0; n < term_.size(); ++n) log_weight_[n] += term_[n];
-    weighed_ = true;
-  } else if (model_.observation == ObservationKind::continuous && functional_->uses_end()) {
-    end_sensor_.reshape(sensor_.components(), x_.nodes());
-    for_blocks(pool_, x_.nodes(), [&](std::size_t first, std::size_t count) {
-      const auto h1 = end_sensor_.view().nodes(first, count);
-      model_.fields->sensor(x_.view().nodes(first, count), h1);
-      functional_->at_end(window, sensor_.view().nodes(first, count), h1,
-                          {log_weight_.data() + first, count});
-    });
-  }
+void EulerFilter::normalise() {
+  if (stale_) normalised_.assign(log_weight_, {}, time_);
+  stale_ = false;
 }
 
 const Posterior& EulerFilter::posterior() {
+  normalise();
   posterior_.time = time_;
   posterior_.log_evidence = normalised_.log_mass;
   posterior_.points = x_;

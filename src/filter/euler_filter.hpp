@@ -19,21 +19,30 @@ class EulerFilter final : public Filter {
   std::string_view name() const override { return "euler"; }
 
  private:
+  /// What a thread needs for a block.
+  struct Scratch {
+    Batch noise, sensor, derivative, end_sensor;
+    std::vector<double> term;
+  };
   void resample_if_due(const ObservationWindow& window);
-  void weigh_at_start(const ObservationWindow& window);
-  void move(const ObservationWindow& window);
-  void weigh_at_end(const ObservationWindow& window);
-  void keep_inside_bounds(const ObservationWindow& window);
+  void step(const ObservationWindow& window, std::size_t first, std::size_t count, Scratch& scratch);
+  void move(const ObservationWindow& window, std::size_t first, ConstBatchView x, BatchView next,
+            Scratch& scratch) const;
+  void keep_inside_bounds(const ObservationWindow& window, std::size_t i, std::size_t first,
+                          std::span<double> x) const;
+  void normalise();
 
   Model model_;
   FilterOptions options_;
   std::unique_ptr<Functional> functional_;
   std::unique_ptr<Thinning> thinning_;
   ThreadPool pool_;
-  Batch x_, next_, noise_, sensor_, derivative_, end_sensor_;
-  std::vector<double> log_weight_, term_;
+  std::vector<Scratch> scratch_;
+  Batch x_, next_;
+  std::vector<double> log_weight_;
   Selection selection_;
-  NormalisedWeights normalised_;
+  NormalisedWeights normalised_;  ///< of log_weight_, unless stale
+  bool stale_ = true;
   double time_ = 0;
   bool weighed_ = false;  ///< whether an observation came since the last resampling
   std::size_t kept_;

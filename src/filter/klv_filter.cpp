@@ -124,20 +124,14 @@ void KlvFilter::thin(const ObservationWindow& window) {
   try {
     thinning_->thin(sites, options_.nodes, random, selection_);
   } catch (const RunError& e) {
-    throw RunError(
-        e.message(),
-        place(window) + (window.observation.empty()
-                             ? fmt::format(", observation increment {}", fmt::join(window.increment, ", "))
-                             : fmt::format(", observation {}", fmt::join(window.observation, ", "))),
-        e.value());
+    throw RunError(e.message(), place_and_observation(window), e.value());
   }
   select(children_, selection_, survivors_);
   statistics_.discarded += selection_.discarded;
 }
 
 const Posterior& KlvFilter::posterior() {
-  if (stale_)
-    normalised_.assign(current_->log_weight, current_->log_likelihood, fmt::format("t = {:g}", time_));
+  if (stale_) normalised_.assign(current_->log_weight, current_->log_likelihood, time_);
   stale_ = false;
   posterior_.time = time_;
   posterior_.log_evidence = normalised_.log_mass;

@@ -4,7 +4,11 @@
 #include <array>
 #include <cassert>
 #include <cmath>
+#include <cstdint>
 #include <numbers>
+
+#include "wienertree/tree/clones.hpp"
+#include "wienertree/tree/lane_sum.hpp"
 
 namespace wienertree {
 namespace {
@@ -17,34 +21,85 @@ struct Atom {
   double x, weight;
 };
 
+struct Range {
+  double low, high;
+};
+
+WIENERTREE_CLONES Range range_of(std::span<const double> values) {
+  const double* x = values.data();
+  const std::size_t n = values.size();
+  std::array<double, sum_lanes> low, high;
+  low.fill(INFINITY);
+  high.fill(-INFINITY);
+  const auto visit = [&](std::size_t l, double v) {
+    low[l] = v < low[l] ? v : low[l];
+    high[l] = v > high[l] ? v : high[l];
+  };
+  std::size_t i = 0;
+  for (; i + sum_lanes <= n; i += sum_lanes)
+    for (std::size_t l = 0; l < sum_lanes; ++l) visit(l, x[i + l]);
+  for (; i < n; ++i) visit(0, x[i]);
+  return {*std::min_element(low.begin(), low.end()), *std::max_element(high.begin(), high.end())};
+}
+
 // Quantiles of Dirac masses in linear time: a histogram locates the atoms around each level, and only those
 // are sorted.
 class AtomQuantiles {
  public:
   AtomQuantiles(std::span<const double> x, std::span<const double> weight) : x_(x), weight_(weight) {
-    const auto [low, high] = std::minmax_element(x.begin(), x.end());
-    low_ = *low;
-    scale_ = *high > *low ? static_cast<double>(buckets) / (*high - *low) : 0.0;
+    const Range range = range_of(x);
+    low_ = range.low;
+    scale_ = range.high > range.low ? static_cast<double>(buckets) / (range.high - range.low) : 0.0;
     for (std::size_t n = 0; n < x.size(); ++n) mass_[bucket(x[n])] += weight[n];
   }
 
-  double at(double level) {
-    // The bucket where the cumulated weight passes the level, with its non-empty neighbours: the midpoints
-    // that bracket the level belong to these.
+  void at(std::span<const double> levels, std::span<double> out) {
+    brackets_.clear();
+    for (const double level : levels) brackets_.push_back(bracket(level));
+    collect_atoms();
+    for (std::size_t q = 0; q < levels.size(); ++q) out[q] = within(brackets_[q], levels[q]);
+  }
+
+ private:
+  static constexpr std::size_t buckets = 1024;
+  struct Bracket {
+    std::size_t first, last;  ///< buckets
+    double before;            ///< weight below them
+  };
+
+  std::size_t bucket(double x) const {
+    return static_cast<std::size_t>(
+        std::min(static_cast<std::int64_t>((x - low_) * scale_), std::int64_t{buckets - 1}));
+  }
+
+  // The bucket where the cumulated weight passes the level, with its non-empty neighbours: the midpoints that
+  // bracket the level belong to these.
+  Bracket bracket(double level) const {
     std::size_t b = 0;
     double before = 0;
     while (b + 1 < buckets && before + mass_[b] < level) before += mass_[b++];
     std::size_t first = b, last = b;
     while (first > 0 && (first == b || mass_[first] == 0)) before -= mass_[--first];
     while (last + 1 < buckets && (last == b || mass_[last] == 0)) ++last;
+    return {first, last, before};
+  }
+
+  void collect_atoms() {
+    std::array<std::uint8_t, buckets> wanted{};
+    for (const Bracket& b : brackets_)
+      std::fill(wanted.begin() + static_cast<std::ptrdiff_t>(b.first),
+                wanted.begin() + static_cast<std::ptrdiff_t>(b.last) + 1, std::uint8_t{1});
     atoms_.clear();
     for (std::size_t n = 0; n < x_.size(); ++n)
-      if (const std::size_t at = bucket(x_[n]); at >= first && at <= last && weight_[n] > 0)
-        atoms_.push_back({x_[n], weight_[n]});
-    std::sort(atoms_.begin(), atoms_.end(), [](const Atom& a, const Atom& b_) { return a.x < b_.x; });
-    if (atoms_.empty()) return x_[0];
-    double previous_x = atoms_.front().x, previous_level = -1;
+      if (wanted[bucket(x_[n])] != 0 && weight_[n] > 0) atoms_.push_back({x_[n], weight_[n]});
+    std::sort(atoms_.begin(), atoms_.end(), [](const Atom& a, const Atom& b) { return a.x < b.x; });
+  }
+
+  double within(const Bracket& bracket, double level) const {
+    double before = bracket.before, previous_x = x_[0], previous_level = -1;
     for (const Atom& a : atoms_) {
+      if (bucket(a.x) < bracket.first) continue;
+      if (bucket(a.x) > bracket.last) break;
       const double middle = before + a.weight / 2;
       if (middle >= level) {
         if (previous_level < 0) return a.x;
@@ -57,14 +112,10 @@ class AtomQuantiles {
     return previous_x;
   }
 
- private:
-  static constexpr std::size_t buckets = 1024;
-  std::size_t bucket(double x) const {
-    return std::min(buckets - 1, static_cast<std::size_t>((x - low_) * scale_));
-  }
   std::span<const double> x_, weight_;
   double low_ = 0, scale_ = 0;
   std::array<double, buckets> mass_{};
+  std::vector<Bracket> brackets_;
   std::vector<Atom> atoms_;
 };
 
@@ -171,8 +222,7 @@ void Marginal::quantiles(std::span<const double> levels, std::span<double> out) 
     for (std::size_t q = 0; q < levels.size(); ++q) out[q] = gaussian_quantile(levels[q]);
     return;
   }
-  AtomQuantiles atoms(atoms_, weight_);
-  for (std::size_t q = 0; q < levels.size(); ++q) out[q] = atoms.at(levels[q]);
+  AtomQuantiles(atoms_, weight_).at(levels, out);
 }
 
 }  // namespace wienertree

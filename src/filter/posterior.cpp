@@ -5,6 +5,9 @@
 #include <cmath>
 
 #include "wienertree/filter/marginal.hpp"
+#include "wienertree/tree/clones.hpp"
+#include "wienertree/tree/lane_sum.hpp"
+#include "wienertree/tree/log_weights.hpp"
 
 namespace wienertree {
 namespace {
@@ -21,6 +24,15 @@ double gaussian_moment(double m, double v, int order) {
   return now;
 }
 
+WIENERTREE_CLONES double weighted_sum(const double* w, const double* x, std::size_t n) {
+  return lane_sum(0, n, [&](std::size_t k) { return w[k] * x[k]; });
+}
+
+WIENERTREE_CLONES double weighted_products(const double* w, const double* x, double x0, const double* y,
+                                           double y0, std::size_t n) {
+  return lane_sum(0, n, [&](std::size_t k) { return w[k] * ((x[k] - x0) * (y[k] - y0)); });
+}
+
 }  // namespace
 
 double Posterior::variance_of(std::size_t i, std::size_t n) const {
@@ -29,19 +41,14 @@ double Posterior::variance_of(std::size_t i, std::size_t n) const {
 }
 
 double mean(const Posterior& posterior, std::size_t i) {
-  const double* x = posterior.points.component(i).data();
-  double sum = 0;
-  for (std::size_t n = 0; n < posterior.size(); ++n) sum += posterior.weight[n] * x[n];
-  return sum;
+  return weighted_sum(posterior.weight.data(), posterior.points.component(i).data(), posterior.size());
 }
 
 double covariance(const Posterior& posterior, std::size_t i, std::size_t j) {
   const double mi = mean(posterior, i), mj = i == j ? mi : mean(posterior, j);
-  const double* x = posterior.points.component(i).data();
-  const double* y = posterior.points.component(j).data();
   const std::size_t d = posterior.points.components();
-  double sum = 0;
-  for (std::size_t n = 0; n < posterior.size(); ++n) sum += posterior.weight[n] * (x[n] - mi) * (y[n] - mj);
+  double sum = weighted_products(posterior.weight.data(), posterior.points.component(i).data(), mi,
+                                 posterior.points.component(j).data(), mj, posterior.size());
   if (!posterior.dirac())
     for (std::size_t n = 0; n < posterior.size(); ++n)
       sum += posterior.weight[n] * posterior.covariance(i * d + j, posterior.covariance.nodes() == 1 ? 0 : n);
@@ -55,11 +62,7 @@ double raw_moment(const Posterior& posterior, std::size_t i, int order) {
   return sum;
 }
 
-double effective_sample_size(const Posterior& posterior) {
-  double sum = 0;
-  for (const double w : posterior.weight) sum += w * w;
-  return 1 / sum;
-}
+double effective_sample_size(const Posterior& posterior) { return 1 / sum_of_squares(posterior.weight); }
 
 void summarise(const Posterior& posterior, std::size_t components, int highest_moment,
                PosteriorSummary& out) {

@@ -5,34 +5,41 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <string>
 
+#include "wienertree/filter/places.hpp"
 #include "wienertree/model/error.hpp"
+#include "wienertree/tree/log_weights.hpp"
 
 namespace wienertree {
+namespace {
 
-void NormalisedWeights::assign(std::span<const double> a, std::span<const double> b,
-                               const std::string& where) {
-  constexpr double infinity = std::numeric_limits<double>::infinity();
-  weight.resize(a.size());
-  double largest = -infinity;
-  for (std::size_t n = 0; n < a.size(); ++n) {
-    weight[n] = a[n] + (b.empty() ? 0.0 : b[n]);
-    largest = std::max(largest, weight[n]);
-  }
-  double sum = 0, squares = 0;
-  if (largest > -infinity && largest < infinity)
-    for (double& w : weight) {
-      w = std::exp(w - largest);
-      sum += w;
-      squares += w * w;
-    }
-  if (!std::isfinite(sum) || largest == infinity) {
-    const auto bad =
-        std::find_if(a.begin(), a.end(), [](double w) { return std::isnan(w) || w == infinity; });
-    throw RunError("the weight of a node is not finite", fmt::format("{}, node {}", where, bad - a.begin()),
-                   bad == a.end() ? std::string() : fmt::format("log-weight {}", *bad));
-  }
-  if (!(sum > 0)) throw RunError("no node has positive weight", where, fmt::format("{} nodes", a.size()));
+constexpr double infinity = std::numeric_limits<double>::infinity();
+
+[[noreturn]] void refuse(std::span<const double> log_weight, const std::string& where) {
+  const auto bad = std::find_if(log_weight.begin(), log_weight.end(),
+                                [](double w) { return std::isnan(w) || w == infinity; });
+  if (bad == log_weight.end())
+    throw RunError("no node has positive weight", where, fmt::format("{} nodes", log_weight.size()));
+  throw RunError("the weight of a node is not finite",
+                 fmt::format("{}, node {}", where, bad - log_weight.begin()),
+                 fmt::format("log-weight {}", *bad));
+}
+
+}  // namespace
+
+void check_log_weights(std::span<const double> log_weight, const ObservationWindow& window) {
+  const auto [largest, all_valid] = largest_log_weight(log_weight);
+  if (!all_valid || largest == -infinity) refuse(log_weight, place_and_observation(window));
+}
+
+void NormalisedWeights::assign(std::span<const double> a, std::span<const double> b, double time) {
+  weight.assign(a.begin(), a.end());
+  for (std::size_t n = 0; n < b.size(); ++n) weight[n] += b[n];
+  const auto [largest, all_valid] = largest_log_weight(weight);
+  if (!all_valid || largest == -infinity) refuse(weight, fmt::format("t = {:g}", time));
+  const double sum = relative_weights(weight, largest, weight.data());
+  const double squares = sum_of_squares(weight);
   for (double& w : weight) w /= sum;
   log_mass = largest + std::log(sum);
   effective_size = sum * sum / squares;

@@ -7,60 +7,16 @@
 #include <bit>
 #include <cassert>
 #include <cmath>
+#include <cstring>
 #include <limits>
-#include <numeric>
 
 #include "wienertree/model/error.hpp"
-#include "wienertree/tree/clones.hpp"
-#include "wienertree/tree/elementary.hpp"
+#include "wienertree/tree/log_weights.hpp"
 
 namespace wienertree {
 namespace {
 
-constexpr std::size_t lanes = 8;    ///< partial sums: a fixed number, so that every clone adds in one order
 constexpr std::size_t chunk = 128;  ///< sites summed plainly before the compensated sum takes over
-
-struct Extremes {
-  double largest;
-  bool all_valid;  ///< no NaN, no +infinity
-};
-
-WIENERTREE_CLONES Extremes extremes(const double* log_weight, std::size_t n) {
-  std::array<double, lanes> largest;
-  std::array<std::uint64_t, lanes> invalid{};
-  largest.fill(-std::numeric_limits<double>::infinity());
-  const auto visit = [&](std::size_t l, double x) {
-    largest[l] = x > largest[l] ? x : largest[l];
-    invalid[l] |= x <= std::numeric_limits<double>::max() ? 0 : 1;
-  };
-  std::size_t i = 0;
-  for (; i + lanes <= n; i += lanes)
-    for (std::size_t l = 0; l < lanes; ++l) visit(l, log_weight[i + l]);
-  for (; i < n; ++i) visit(0, log_weight[i]);
-  return {*std::max_element(largest.begin(), largest.end()),
-          std::accumulate(invalid.begin(), invalid.end(), std::uint64_t{0}) == 0};
-}
-
-// w_i = exp(log_weight_i - largest) as bits into `weight`; returns their sum.
-WIENERTREE_CLONES double relative_weights(const double* log_weight, double largest, std::size_t n,
-                                          std::uint64_t* weight) {
-  std::array<double, lanes> sum{};
-  std::size_t i = 0;
-  for (; i + lanes <= n; i += lanes)
-    for (std::size_t l = 0; l < lanes; ++l) {
-      const double w = elementary::exp_nonpositive(log_weight[i + l] - largest);
-      weight[i + l] = std::bit_cast<std::uint64_t>(w);
-      sum[l] += w;
-    }
-  double total = 0;
-  for (; i < n; ++i) {
-    const double w = elementary::exp_nonpositive(log_weight[i] - largest);
-    weight[i] = std::bit_cast<std::uint64_t>(w);
-    total += w;
-  }
-  for (const double s : sum) total += s;
-  return total;
-}
 
 // Neumaier (1974, Z. angew. Math. Mech. 54, 39-51).
 class CompensatedSum {
@@ -95,14 +51,17 @@ void assign_masses(std::span<const double> log_weight, std::uint64_t particles, 
                      "thinning", fmt::format("{}", particles));
   if (n > std::numeric_limits<std::uint32_t>::max())
     throw InputError("too many sites for 32-bit indices", "thinning", fmt::format("{}", n));
-  const auto [largest, all_valid] = extremes(log_weight.data(), n);
+  const auto [largest, all_valid] = largest_log_weight(log_weight);
   if (!all_valid || largest == -std::numeric_limits<double>::infinity()) refuse(log_weight);
 
   out.mass.resize(n);
   CompensatedSum sum;
-  for (std::size_t first = 0; first < n; first += chunk)
-    sum.add(relative_weights(log_weight.data() + first, largest, std::min(chunk, n - first),
-                             out.mass.data() + first));
+  std::array<double, chunk> w;
+  for (std::size_t first = 0; first < n; first += chunk) {
+    const std::size_t count = std::min(chunk, n - first);
+    sum.add(relative_weights(log_weight.subspan(first, count), largest, w.data()));
+    std::memcpy(out.mass.data() + first, w.data(), count * sizeof(double));  // as bits, until scaled
+  }
   const double total = sum.value();
   out.particles = particles;
   out.fraction_bits = 63 - static_cast<int>(std::bit_width(particles));

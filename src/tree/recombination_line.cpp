@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "wienertree/tree/log_weights.hpp"
 #include "wienertree/tree/recombination_vectors.hpp"
 
 namespace wienertree::recombination {
@@ -101,8 +102,7 @@ void LineRecombination::reduce(std::span<const double> x, std::span<const double
   const std::size_t n = x.size();
   const LineRule rule = line_rule(degree, budget);
   weight_.resize(n);
-  relative_weights(log_weight.data(), *std::max_element(log_weight.begin(), log_weight.end()), n,
-                   weight_.data());
+  relative_weights(log_weight, *std::max_element(log_weight.begin(), log_weight.end()), weight_.data());
   cumulative_.resize(n + 1);
   cumulative_[0] = 0;
   for (std::size_t i = 0; i < n; ++i) cumulative_[i + 1] = cumulative_[i] + weight_[i];
@@ -130,7 +130,7 @@ void LineRecombination::reduce_patch(std::span<const double> x, std::span<const 
     return;
   }
   const double largest = *std::max_element(log_weight.begin(), log_weight.end());
-  const double mass = relative_weights(log_weight.data(), largest, n, weight_.data());
+  const double mass = relative_weights(log_weight, largest, weight_.data());
   const double half = x.back() / 2 - x.front() / 2, centre = x.front() + half;
   z_.resize(n);
   for (std::size_t i = 0; i < n; ++i) z_[i] = half > 0 ? std::clamp((x[i] - centre) / half, -1.0, 1.0) : 0.0;

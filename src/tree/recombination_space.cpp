@@ -5,6 +5,7 @@
 #include <limits>
 #include <numeric>
 
+#include "wienertree/tree/log_weights.hpp"
 #include "wienertree/tree/recombination.hpp"
 #include "wienertree/tree/recombination_vectors.hpp"
 
@@ -19,7 +20,7 @@ void SpaceRecombination::reduce(ConstBatchView x, std::span<const double> log_we
   partition_.reset(x.components(), x.nodes());
   for (std::size_t i = 0; i < x.components(); ++i)
     std::copy(x.component(i).begin(), x.component(i).end(), partition_.component(i).begin());
-  const double total = relative_weights(log_weight.data(), largest, x.nodes(), partition_.weight().data());
+  const double total = relative_weights(log_weight, largest, partition_.weight().data());
   partition_.cut(degree, moment_number(x.components(), degree, budget), budget);
   for (const Patch& patch : partition_.patches()) reduce_patch(patch, log_weight, degree, largest, out);
   out.discarded /= total;
@@ -41,8 +42,7 @@ void SpaceRecombination::reduce_patch(const Patch& patch, std::span<const double
   for (std::size_t t = 0; t < order.size(); ++t) patch_log_weight_[t] = log_weight[order[t]];
   const double heaviest = *std::max_element(patch_log_weight_.begin(), patch_log_weight_.end());
   points_.reserve(d, patch.size());
-  const double weight =
-      relative_weights(patch_log_weight_.data(), heaviest, patch.size(), points_.weight.data());
+  const double weight = relative_weights(patch_log_weight_, heaviest, points_.weight.data());
   std::size_t n = 0;
   for (std::size_t t = 0; t < order.size(); ++t) {
     points_.weight[n] = points_.weight[t];

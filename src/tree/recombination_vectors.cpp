@@ -3,15 +3,8 @@
 #include <cmath>
 
 #include "wienertree/tree/clones.hpp"
-#include "wienertree/tree/elementary.hpp"
 
 namespace wienertree::recombination {
-
-WIENERTREE_CLONES double relative_weights(const double* log_weight, double largest, std::size_t n,
-                                          double* w) {
-  for (std::size_t i = 0; i < n; ++i) w[i] = elementary::exp_nonpositive(log_weight[i] - largest);
-  return lane_sum(0, n, [&](std::size_t i) { return w[i]; });
-}
 
 WIENERTREE_CLONES MeanDeviation mean_deviation(const double* x, const double* w, std::size_t n) {
   const double mass = lane_sum(0, n, [&](std::size_t i) { return w[i]; });

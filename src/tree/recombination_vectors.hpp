@@ -1,13 +1,14 @@
 #pragma once
 /// Vectors in a fixed order of operations that processors with wide registers can follow: eight partial sums,
 /// whatever the instruction set. To be inlined into functions marked WIENERTREE_CLONES.
-#include <array>
 #include <cstddef>
 #include <vector>
 
+#include "wienertree/tree/lane_sum.hpp"
+
 namespace wienertree::recombination {
 
-inline constexpr std::size_t lanes = 8;
+inline constexpr std::size_t lanes = sum_lanes;
 
 /// Lengths of vectors that `dot` and `add_multiple` take; what lies beyond n is to be 0.
 inline constexpr std::size_t padded(std::size_t n) { return (n + lanes - 1) / lanes * lanes; }
@@ -38,25 +39,10 @@ using Four [[gnu::vector_size(32), gnu::aligned(8), gnu::may_alias]] = double;
   for (std::size_t i = 0; i < n; i += 4) four(a + i) += factor * four(b + i);
 }
 
-/// w_i = exp(log_weight_i - largest), 0 below exp(-700); returns their sum. @pre largest >= log_weight_i
-double relative_weights(const double* log_weight, double largest, std::size_t n, double* w);
-
 /// Mean and standard deviation under weights w_i >= 0 of positive sum; two passes.
 struct MeanDeviation {
   double mean, deviation;
 };
 MeanDeviation mean_deviation(const double* x, const double* w, std::size_t n);
-
-/// sum_i term(i), i = first..last-1
-template <class Term>
-[[gnu::always_inline]] inline double lane_sum(std::size_t first, std::size_t last, Term term) {
-  std::array<double, lanes> sum{};
-  std::size_t i = first;
-  for (; i + lanes <= last; i += lanes)
-    for (std::size_t l = 0; l < lanes; ++l) sum[l] += term(i + l);
-  double rest = 0;
-  for (; i < last; ++i) rest += term(i);
-  return ((sum[0] + sum[4]) + (sum[2] + sum[6])) + ((sum[1] + sum[5]) + (sum[3] + sum[7])) + rest;
-}
 
 }  // namespace wienertree::recombination
