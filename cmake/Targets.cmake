@@ -31,6 +31,12 @@ function(wienertree_test name)
   target_link_libraries(test_${name} PRIVATE ${ARG_LIBS} wienertree_catch_main wienertree_build_settings)
   target_include_directories(test_${name} PRIVATE ${PROJECT_SOURCE_DIR}/tests)
   target_compile_definitions(test_${name} PRIVATE WIENERTREE_SOURCE_DIR="${PROJECT_SOURCE_DIR}")
+  # Sanitizers are slow: statistics of the papers run without, and only what is threaded under the thread sanitizer.
+  if((WIENERTREE_SANITIZE AND "papers" IN_LIST ARG_LABELS) OR
+     (WIENERTREE_SANITIZE STREQUAL thread AND NOT "threads" IN_LIST ARG_LABELS))
+    set_target_properties(test_${name} PROPERTIES EXCLUDE_FROM_ALL ON)
+    return()
+  endif()
   add_test(NAME ${name} COMMAND test_${name})
   if(WIENERTREE_SANITIZE MATCHES address)
     set_tests_properties(${name} PROPERTIES ENVIRONMENT
