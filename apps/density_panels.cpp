@@ -24,8 +24,10 @@ Interval bulk(const Posterior& posterior, std::size_t i) {
   return {q[0] - margin, q[1] + margin};
 }
 
-// Particles: about as many bins as their number allows to tell apart. Smooth laws: as many as the eye does.
+// Particles: about as many bins as their number allows to tell apart. Families of a tree: as many as the eye
+// does. A sum of Gaussians: its density as a curve.
 std::size_t bins_for(const Posterior& posterior, const Marginal& law) {
+  if (!posterior.dirac()) return points_a_curve;
   if (law.has_density()) return 48;
   return static_cast<std::size_t>(std::clamp(2 * std::cbrt(effective_sample_size(posterior)) + 6, 8.0, 60.0));
 }

@@ -6,17 +6,16 @@
 #include <thread>
 
 #include "formula_choice.hpp"
+#include "wienertree/filter/gaussian_mixture_filter.hpp"
 
 namespace wienertree::app {
 namespace {
 
-const Choices<FilterMethod> methods = {{"klv", FilterMethod::klv},
-                                       {"full-tree", FilterMethod::full_tree},
-                                       {"euler", FilterMethod::euler},
-                                       {"benes", FilterMethod::benes},
-                                       {"kalman-bucy", FilterMethod::kalman_bucy},
-                                       {"kalman", FilterMethod::kalman},
-                                       {"grid", FilterMethod::grid}};
+const Choices<FilterMethod> methods = {
+    {"klv", FilterMethod::klv},       {"full-tree", FilterMethod::full_tree},
+    {"euler", FilterMethod::euler},   {"gaussian-mixture", FilterMethod::gaussian_mixture},
+    {"benes", FilterMethod::benes},   {"kalman-bucy", FilterMethod::kalman_bucy},
+    {"kalman", FilterMethod::kalman}, {"grid", FilterMethod::grid}};
 const Choices<ThinningMethod> thinnings = {{"none", ThinningMethod::none},
                                            {"tbba", ThinningMethod::tbba},
                                            {"multinomial", ThinningMethod::multinomial},
@@ -35,6 +34,11 @@ const Choices<FlowMethod> flows = {{"auto", FlowMethod::automatic},
                                    {"explicit", FlowMethod::explicit_},
                                    {"cvode", FlowMethod::cvode}};
 const Choices<OnNodeFailure> failures = {{"stop", OnNodeFailure::stop}, {"drop", OnNodeFailure::drop}};
+
+// Whether a filter moves particles that are resampled.
+bool resamples(FilterMethod method) {
+  return method == FilterMethod::euler || method == FilterMethod::gaussian_mixture;
+}
 
 // An option given where it means nothing is a mistake worth telling.
 void refuse_if(bool given, const char* option, const std::string& reason) {
@@ -70,12 +74,16 @@ void refuse_inapplicable(const FilterArguments& a, const Model& model, FilterMet
   const std::string with_method = "has no meaning with --method " + name_of(methods, method);
   const std::string with_thinning = "has no meaning with --thin " + name_of(thinnings, thin);
   refuse_if(a.ess_threshold && method != FilterMethod::euler, "--ess-threshold", with_method);
+  refuse_if(a.alpha && method != FilterMethod::gaussian_mixture, "--alpha", with_method);
+  refuse_if(a.beta && method != FilterMethod::gaussian_mixture, "--beta", with_method);
   refuse_if(a.functional && model.observation != ObservationKind::continuous, "--functional",
             "has meaning only for continuous observations");
-  if (method == FilterMethod::euler) {
+  if (resamples(method)) {
     refuse_tree_options(a, with_method);
     refuse_if(a.thin == ThinningMethod::recombination, "--thin",
               "recombination " + with_method + ", which counts particles");
+    refuse_if(thin == ThinningMethod::none && method == FilterMethod::gaussian_mixture, "--thin",
+              "none " + with_method + ", whose corrections draw offspring");
     refuse_if(a.order && thin == ThinningMethod::none, "--order", with_thinning);
     return;
   }
@@ -109,6 +117,7 @@ ThinningMethod thinning_of(const FilterArguments& a, FilterMethod method) {
   if (method == FilterMethod::klv)
     return a.thin.value_or(carried ? ThinningMethod::tbba : ThinningMethod::recombination);
   if (method == FilterMethod::euler) return a.thin.value_or(ThinningMethod::systematic);
+  if (method == FilterMethod::gaussian_mixture) return a.thin.value_or(ThinningMethod::tbba);
   return ThinningMethod::none;
 }
 
@@ -116,6 +125,7 @@ ThinningMethod thinning_of(const FilterArguments& a, FilterMethod method) {
 std::size_t default_nodes(FilterMethod method, ThinningMethod thin, std::size_t dimension) {
   if (method == FilterMethod::grid) return FilterOptions{}.grid_points;
   if (method == FilterMethod::euler) return 10000;
+  if (method == FilterMethod::gaussian_mixture) return 1000;
   if (thin == ThinningMethod::recombination) return dimension == 1 ? 60 : dimension == 2 ? 300 : 600;
   return dimension == 1 ? 1000 : 10000;
 }
@@ -164,6 +174,10 @@ void add_filter_options(CLI::App& app, FilterArguments& a) {
   add_tree_options(app, a);
   add_number(app, "--ess-threshold", a.ess_threshold, Sign::any,
              "euler: resample when the effective sample size is at most this part of --nodes [1]");
+  add_number(app, "--alpha", a.alpha, Sign::any,
+             "gaussian-mixture: part of the noise that spreads the Gaussians, 0 to 1 [1/sqrt(nodes)]");
+  add_number(app, "--beta", a.beta, Sign::any,
+             "gaussian-mixture: offspring have the variance alpha beta [0]");
   add_count(app, "--launches", a.launches, 1, "Independent runs of a random method, averaged [1]", 1'000'000);
 }
 
@@ -184,7 +198,7 @@ std::optional<FilterMethod> exact_method(const Model& model) {
 std::string method_name(FilterMethod method) { return name_of(methods, method); }
 
 bool keeps_nodes(FilterMethod method) {
-  return method == FilterMethod::klv || method == FilterMethod::full_tree || method == FilterMethod::euler;
+  return method == FilterMethod::klv || method == FilterMethod::full_tree || resamples(method);
 }
 
 FilterSetup filter_setup(const FilterArguments& a, const Model& model) {
@@ -198,7 +212,7 @@ FilterSetup filter_setup(const FilterArguments& a, const Model& model) {
       a.nodes.value_or(default_nodes(o.method, o.thinning.method, model.reported_dimension()));
   (o.method == FilterMethod::grid ? o.grid_points : o.nodes) = nodes;
   if (!keeps_nodes(o.method)) return setup;
-  if (o.method != FilterMethod::euler)
+  if (!resamples(o.method))
     o.formula = choose_formula(degree_for(a, model), a.formula, model.noise_dimension());
   o.thinning.order = a.order.value_or(SiteOrder::spatial);
   o.thinning.recombination_degree = static_cast<int>(a.recombination_degree.value_or(0));
@@ -209,12 +223,14 @@ FilterSetup filter_setup(const FilterArguments& a, const Model& model) {
   o.tolerance.absolute = a.absolute_tolerance.value_or(o.tolerance.absolute);
   o.on_node_failure = a.on_node_failure.value_or(OnNodeFailure::stop);
   o.ess_threshold = a.ess_threshold.value_or(o.ess_threshold);
+  o.alpha = a.alpha;
+  o.beta = a.beta.value_or(o.beta);
   o.seed = a.seed.value_or(1);
   const bool many = o.method == FilterMethod::full_tree || o.nodes >= nodes_worth_threads;
   o.threads =
       static_cast<unsigned>(a.threads.value_or(many ? std::max(1U, std::thread::hardware_concurrency()) : 1));
   setup.launches = static_cast<std::uint32_t>(a.launches.value_or(1));
-  setup.random = o.method == FilterMethod::euler ||
+  setup.random = resamples(o.method) ||
                  (o.method == FilterMethod::klv && o.thinning.method != ThinningMethod::recombination);
   return setup;
 }
@@ -238,6 +254,10 @@ Json options_in_force(const FilterSetup& setup, const Model& model) {
   }
   if (o.method == FilterMethod::klv) json["prune-weights"] = name_of(prunings, o.prune_weights);
   if (o.method == FilterMethod::euler) json["ess-threshold"] = o.ess_threshold;
+  if (o.method == FilterMethod::gaussian_mixture) {
+    json["alpha"] = mixture_alpha(o);
+    json["beta"] = o.beta;
+  }
   if (model.observation == ObservationKind::continuous)
     json["functional"] = name_of(functionals, o.functional);
   if (tree) {
@@ -258,10 +278,12 @@ std::string describe(const FilterSetup& setup) {
   if (o.method == FilterMethod::grid) return fmt::format("grid filter, {} cells", o.nodes);
   if (!keeps_nodes(o.method)) return "exact " + method_name(o.method) + " filter";
   if (o.method == FilterMethod::full_tree) return fmt::format("full tree, degree {}", o.formula.degree);
-  const std::string nodes =
-      fmt::format("{} {} by {}", o.nodes, o.method == FilterMethod::euler ? "particles" : "nodes",
-                  name_of(thinnings, o.thinning.method));
+  const char* what = o.method == FilterMethod::euler              ? "particles"
+                     : o.method == FilterMethod::gaussian_mixture ? "Gaussians"
+                                                                  : "nodes";
+  const std::string nodes = fmt::format("{} {} by {}", o.nodes, what, name_of(thinnings, o.thinning.method));
   if (o.method == FilterMethod::euler) return "Euler particle filter, " + nodes;
+  if (o.method == FilterMethod::gaussian_mixture) return "Gaussian-mixture filter, " + nodes;
   return fmt::format("KLV filter, degree {}, {}", o.formula.degree, nodes);
 }
 

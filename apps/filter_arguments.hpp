@@ -20,7 +20,7 @@ struct FilterArguments {
   std::optional<PruneWeights> prune_weights;
   std::optional<FunctionalMethod> functional;
   std::optional<FlowMethod> flow;
-  std::optional<double> relative_tolerance, absolute_tolerance, ess_threshold;
+  std::optional<double> relative_tolerance, absolute_tolerance, ess_threshold, alpha, beta;
   std::optional<OnNodeFailure> on_node_failure;
 };
 

@@ -1,12 +1,9 @@
 #include "wienertree/filter/euler_filter.hpp"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
-#include "wienertree/filter/places.hpp"
+#include "wienertree/filter/bounds.hpp"
 #include "wienertree/tree/initial.hpp"
 
 namespace wienertree {
@@ -132,25 +129,7 @@ void EulerFilter::move(const ObservationWindow& window, std::size_t first, Const
     for (double& v : z) v *= root;
   }
   model_.fields->euler_step(x, s, scratch.noise, next);
-  for (std::size_t i = 0; i < next.components(); ++i) keep_inside_bounds(window, i, first, next.component(i));
-}
-
-void EulerFilter::keep_inside_bounds(const ObservationWindow& window, std::size_t i, std::size_t first,
-                                     std::span<double> x) const {
-  constexpr double largest = std::numeric_limits<double>::max();
-  const StateBound& b = model_.bounds[i];
-  if (b.bounded() && b.boundary != Boundary::error)
-    for (double& v : x) v = v < b.lower ? b.lower : v > b.upper ? b.upper : v;  // NaN stays
-  const double lower = std::max(b.lower, -largest), upper = std::min(b.upper, largest);
-  const auto inside = [&](double v) { return (v >= lower) & (v <= upper); };
-  std::uint64_t outside = 0;
-  for (const double v : x) outside |= inside(v) ? 0 : 1;
-  if (outside == 0) return;
-  const auto n = static_cast<std::size_t>(std::find_if_not(x.begin(), x.end(), inside) - x.begin());
-  throw RunError(
-      std::isfinite(x[n]) ? "a particle left the state's bounds" : "a particle's state is not finite",
-      fmt::format("{}, particle {}, state {}", place(window), first + n, model_.state_names[i]),
-      fmt::format("{}", x[n]));
+  keep_inside_bounds(model_, window, first, next);
 }
 
 void EulerFilter::normalise() {

@@ -28,8 +28,6 @@ class EulerFilter final : public Filter {
   void step(const ObservationWindow& window, std::size_t first, std::size_t count, Scratch& scratch);
   void move(const ObservationWindow& window, std::size_t first, ConstBatchView x, BatchView next,
             Scratch& scratch) const;
-  void keep_inside_bounds(const ObservationWindow& window, std::size_t i, std::size_t first,
-                          std::span<double> x) const;
   void normalise();
 
   Model model_;

@@ -6,6 +6,7 @@
 
 #include "wienertree/filter/benes_filter.hpp"
 #include "wienertree/filter/euler_filter.hpp"
+#include "wienertree/filter/gaussian_mixture_filter.hpp"
 #include "wienertree/filter/grid_filter.hpp"
 #include "wienertree/filter/kalman_bucy_filter.hpp"
 #include "wienertree/filter/kalman_filter.hpp"
@@ -38,8 +39,21 @@ void check_particle_options(const FilterOptions& options) {
   if (!(options.ess_threshold >= 0 && options.ess_threshold <= 1))
     throw InputError("must lie between 0 and 1", "ess-threshold", fmt::format("{}", options.ess_threshold));
   if (options.thinning.method == ThinningMethod::recombination)
-    throw InputError("the Euler filter needs a thinning that counts particles; recombination keeps weights",
-                     "thin", "recombination");
+    throw InputError("particles need a thinning that counts them; recombination keeps weights", "thin",
+                     "recombination");
+}
+
+void check_mixture_options(const FilterOptions& options) {
+  check_particle_options(options);
+  if (options.thinning.method == ThinningMethod::none)
+    throw InputError("the Gaussian-mixture filter needs a thinning for its corrections", "thin", "none");
+  if (options.ess_threshold < 1)
+    throw InputError("the Gaussian-mixture filter corrects at every step", "ess-threshold",
+                     fmt::format("{}", options.ess_threshold));
+  if (options.alpha && !(*options.alpha >= 0 && *options.alpha <= 1))
+    throw InputError("must lie between 0 and 1", "alpha", fmt::format("{}", *options.alpha));
+  if (!(options.beta >= 0 && std::isfinite(options.beta)))
+    throw InputError("must be a number of at least 0", "beta", fmt::format("{}", options.beta));
 }
 
 }  // namespace
@@ -61,6 +75,9 @@ std::unique_ptr<Filter> make_filter(const Model& model, const FilterOptions& opt
     case FilterMethod::euler:
       check_particle_options(options);
       return std::make_unique<EulerFilter>(model, options);
+    case FilterMethod::gaussian_mixture:
+      check_mixture_options(options);
+      return std::make_unique<GaussianMixtureFilter>(model, options);
     case FilterMethod::full_tree: {
       check_tree_options(model, options);
       FilterOptions unpruned = options;

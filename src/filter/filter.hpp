@@ -46,7 +46,7 @@ class Filter {
   FilterStatistics statistics_;
 };
 
-enum class FilterMethod { klv, full_tree, euler, benes, kalman_bucy, kalman, grid };
+enum class FilterMethod { klv, full_tree, euler, gaussian_mixture, benes, kalman_bucy, kalman, grid };
 
 /// Which weights decide where the particles go (Crisan, Ortiz-Latorre 2013, versions 1 and 2).
 enum class PruneWeights {
@@ -66,6 +66,9 @@ struct FilterOptions {
   FunctionalMethod functional = FunctionalMethod::second_order;
   double ess_threshold =
       1.0;  ///< Euler: resample when the effective sample size is at most this fraction of N
+  std::optional<double>
+      alpha;        ///< Gaussian mixture: part of the noise that spreads the Gaussians; N^{-1/2} if none
+  double beta = 0;  ///< Gaussian mixture: offspring have variance alpha beta
   FlowMethod flow = FlowMethod::automatic;
   FlowTolerance tolerance;
   OnNodeFailure on_node_failure = OnNodeFailure::stop;
