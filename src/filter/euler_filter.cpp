@@ -54,7 +54,7 @@ void EulerFilter::resample_if_due(const ObservationWindow& window) {
   }
   const RandomStream random{options_.seed, options_.launch, static_cast<std::uint32_t>(window.step),
                             Purpose::thinning};
-  thinning_->thin({x_, log_weight_, 0}, options_.nodes, random, selection_);
+  thinning_->thin({x_, log_weight_, 0, &pool_}, options_.nodes, random, selection_);
   const std::size_t kept = selection_.site.size();
   for (std::size_t i = 0; i < x_.components(); ++i) {
     const double* from = x_.component(i).data();

@@ -118,7 +118,7 @@ void KlvFilter::thin(const ObservationWindow& window) {
     copy_generation(children_, survivors_);
     return;
   }
-  const Sites sites{children_.states, children_.log_weight, survivors_.size()};
+  const Sites sites{children_.states, children_.log_weight, survivors_.size(), &grower_.threads()};
   const RandomStream random{options_.seed, options_.launch, static_cast<std::uint32_t>(window.step),
                             Purpose::thinning};
   try {
@@ -126,7 +126,7 @@ void KlvFilter::thin(const ObservationWindow& window) {
   } catch (const RunError& e) {
     throw RunError(e.message(), place_and_observation(window), e.value());
   }
-  select(children_, selection_, survivors_);
+  select(children_, selection_, survivors_, &grower_.threads());
   statistics_.discarded += selection_.discarded;
 }
 

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "wienertree/model/error.hpp"
 #include "wienertree/tree/resampling.hpp"
@@ -11,6 +12,8 @@
 
 namespace wienertree {
 namespace {
+
+constexpr std::size_t block = 16384;  ///< sites a task
 
 void check_shapes(const Sites& sites) {
   if (sites.x.nodes() != sites.log_weight.size())
@@ -51,21 +54,24 @@ std::string_view CountingThinning::name() const {
 void CountingThinning::thin(const Sites& sites, std::size_t budget, const RandomStream& random,
                             Selection& out) {
   check_shapes(sites);
-  assign_masses(sites.log_weight, budget, masses_);
+  assign_masses(sites.log_weight, budget, masses_, sites.threads);
   if (order_ == SiteOrder::tree && sites.parents == 0) {
     // Visited as they are stored; a site without weight has no mass.
-    count_particles(masses_.mass, random);
-    collect([](std::size_t i) { return i; }, out);
+    count_particles(masses_.mass, random, sites.threads);
+    collect([](std::size_t i) { return i; }, sites.threads, out);
     return;
   }
   put_in_order(order_, ordering_, sites, masses_, visit_);
   visited_mass_.resize(visit_.size());
-  for (std::size_t i = 0; i < visit_.size(); ++i) visited_mass_[i] = masses_.mass[visit_[i]];
-  count_particles(visited_mass_, random);
-  collect([this](std::size_t i) { return visit_[i]; }, out);
+  for_blocks(sites.threads, visit_.size(), block, [&](std::size_t first, std::size_t count, std::size_t) {
+    for (std::size_t i = first; i < first + count; ++i) visited_mass_[i] = masses_.mass[visit_[i]];
+  });
+  count_particles(visited_mass_, random, sites.threads);
+  collect([this](std::size_t i) { return visit_[i]; }, sites.threads, out);
 }
 
-void CountingThinning::count_particles(std::span<const std::uint64_t> mass, const RandomStream& random) {
+void CountingThinning::count_particles(std::span<const std::uint64_t> mass, const RandomStream& random,
+                                       ThreadPool* threads) {
   count_.resize(mass.size());
   const int bits = masses_.fraction_bits;
   switch (method_) {
@@ -80,38 +86,48 @@ void CountingThinning::count_particles(std::span<const std::uint64_t> mass, cons
     default:
       break;
   }
+  if (threads != nullptr && threads->size() > 1) return tbba(mass, bits, random, *threads, count_);
   TbbaRemainder all{masses_.particles << bits, false};
   tbba(mass, bits, random, 0, all, count_);
 }
 
+// Blocks are counted, then written each to its own place.
 template <class SiteAt>
-void CountingThinning::collect(SiteAt site_at, Selection& out) {
-  const std::size_t most = std::min<std::size_t>(count_.size(), masses_.particles) + 1;  // one to overwrite
-  out.site.resize(most);
-  out.count.resize(most);
-  out.log_weight.resize(most);
+void CountingThinning::collect(SiteAt site_at, ThreadPool* threads, Selection& out) {
+  const std::size_t n = count_.size();
+  kept_before_.resize((n + block - 1) / block);
+  for_blocks(threads, n, block, [&](std::size_t first, std::size_t count, std::size_t b) {
+    std::size_t kept = 0;
+    for (std::size_t i = first; i < first + count; ++i) kept += count_[i] > 0 ? 1 : 0;
+    kept_before_[b] = kept;
+  });
   std::size_t kept = 0;
-  for (std::size_t i = 0; i < count_.size(); ++i) {
-    out.site[kept] = static_cast<std::uint32_t>(site_at(i));
-    out.count[kept] = count_[i];
-    kept += count_[i] > 0 ? 1 : 0;
-  }
+  for (std::size_t& k : kept_before_) kept += std::exchange(k, kept);
   out.site.resize(kept);
   out.count.resize(kept);
   out.log_weight.resize(kept);
   const double log_particle = masses_.log_total - std::log(static_cast<double>(masses_.particles));
-  for (std::size_t k = 0; k < kept; ++k) {
-    const std::uint32_t o = out.count[k];
-    out.log_weight[k] =
-        log_particle + (o < log_small_.size() ? log_small_[o] : std::log(static_cast<double>(o)));
-  }
+  for_blocks(threads, n, block, [&](std::size_t first, std::size_t count, std::size_t b) {
+    std::size_t k = kept_before_[b];
+    const std::size_t end = b + 1 < kept_before_.size() ? kept_before_[b + 1] : kept;
+    for (std::size_t i = first; i < first + count && k < end; ++i) {
+      out.site[k] = static_cast<std::uint32_t>(site_at(i));
+      out.count[k] = count_[i];
+      k += count_[i] > 0 ? 1 : 0;
+    }
+    for (k = kept_before_[b]; k < end; ++k) {
+      const std::uint32_t o = out.count[k];
+      out.log_weight[k] =
+          log_particle + (o < log_small_.size() ? log_small_[o] : std::log(static_cast<double>(o)));
+    }
+  });
   out.discarded = 0;
   out.moved_states.reshape(0, 0);
 }
 
 void KeepAll::thin(const Sites& sites, std::size_t, const RandomStream&, Selection& out) {
   check_shapes(sites);
-  assign_masses(sites.log_weight, 1, masses_);
+  assign_masses(sites.log_weight, 1, masses_, sites.threads);
   put_in_order(order_, ordering_, sites, masses_, out.site);
   out.count.clear();
   out.log_weight.resize(out.site.size());

@@ -22,9 +22,9 @@ class CountingThinning final : public Thinning {
   std::string_view name() const override;
 
  private:
-  void count_particles(std::span<const std::uint64_t> mass, const RandomStream& random);
+  void count_particles(std::span<const std::uint64_t> mass, const RandomStream& random, ThreadPool* threads);
   template <class SiteAt>
-  void collect(SiteAt site_at, Selection& out);
+  void collect(SiteAt site_at, ThreadPool* threads, Selection& out);
 
   ThinningMethod method_;
   SiteOrder order_;
@@ -32,7 +32,8 @@ class CountingThinning final : public Thinning {
   ParticleMasses masses_;
   std::vector<std::uint32_t> visit_, count_;
   std::vector<std::uint64_t> visited_mass_;
-  std::vector<double> log_small_;  ///< log o for small o > 0
+  std::vector<std::size_t> kept_before_;  ///< each block of sites
+  std::vector<double> log_small_;         ///< log o for small o > 0
 };
 
 /// Keeps every site of positive weight, with its weight, in the order asked for; the budget is not used.

@@ -53,10 +53,18 @@ void plant(const Generation& parents, std::size_t branch, double log_lambda, std
 }
 
 template <class T>
-void gather(const std::vector<T>& from, std::span<const std::uint32_t> site, std::vector<T>& to) {
+void gather(std::span<const T> from, std::span<const std::uint32_t> site, std::span<T> to,
+            ThreadPool* threads) {
+  for_blocks(threads, site.size(), nodes_a_task, [&](std::size_t first, std::size_t count, std::size_t) {
+    for (std::size_t k = first; k < first + count; ++k) to[k] = from[site[k]];
+  });
+}
+
+template <class T>
+void gather(const std::vector<T>& from, std::span<const std::uint32_t> site, std::vector<T>& to,
+            ThreadPool* threads) {
   to.resize(from.empty() ? 0 : site.size());
-  if (from.empty()) return;
-  for (std::size_t k = 0; k < site.size(); ++k) to[k] = from[site[k]];
+  if (!from.empty()) gather(std::span<const T>(from), site, std::span<T>(to), threads);
 }
 
 void copy_states(const Batch& from, Batch& to) {
@@ -111,7 +119,8 @@ FlowStatistics TreeGrower::statistics() const {
   return total;
 }
 
-void select(const Generation& children, const Selection& selection, Generation& survivors) {
+void select(const Generation& children, const Selection& selection, Generation& survivors,
+            ThreadPool* threads) {
   const std::span<const std::uint32_t> site = selection.site;
   const std::size_t kept = site.size(), d = children.states.components();
   assert(selection.log_weight.size() == kept && &children != &survivors);
@@ -125,17 +134,14 @@ void select(const Generation& children, const Selection& selection, Generation& 
     copy_states(selection.moved_states, survivors.states);
   } else {
     survivors.states.reshape(d, kept);
-    for (std::size_t i = 0; i < d; ++i) {
-      const auto from = children.states.component(i);
-      const auto to = survivors.states.component(i);
-      for (std::size_t k = 0; k < kept; ++k) to[k] = from[site[k]];
-    }
+    for (std::size_t i = 0; i < d; ++i)
+      gather(children.states.component(i), site, survivors.states.component(i), threads);
   }
   survivors.log_weight = selection.log_weight;
   survivors.count = selection.count;
-  gather(children.log_likelihood, site, survivors.log_likelihood);
-  gather(children.parent, site, survivors.parent);
-  gather(children.branch, site, survivors.branch);
+  gather(children.log_likelihood, site, survivors.log_likelihood, threads);
+  gather(children.parent, site, survivors.parent, threads);
+  gather(children.branch, site, survivors.branch, threads);
 }
 
 void copy_generation(const Generation& from, Generation& to) {

@@ -53,8 +53,10 @@ class TreeGrower {
 /// The nodes of `children` that were selected, in the order of the selection: states (the selection's own
 /// where it moved them), log-weights and counts from the selection, all else from the child. Buffers are
 /// reused.
+/// @param threads to work on, if any
 /// @throws InputError if the selection names a site that does not exist
-void select(const Generation& children, const Selection& selection, Generation& survivors);
+void select(const Generation& children, const Selection& selection, Generation& survivors,
+            ThreadPool* threads = nullptr);
 
 /// All nodes. Buffers of `to` are reused.
 void copy_generation(const Generation& from, Generation& to);

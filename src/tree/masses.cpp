@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <bit>
 #include <cassert>
 #include <cmath>
@@ -17,6 +18,7 @@ namespace wienertree {
 namespace {
 
 constexpr std::size_t chunk = 128;  ///< sites summed plainly before the compensated sum takes over
+constexpr std::size_t block = 128 * chunk;
 
 // Neumaier (1974, Z. angew. Math. Mech. 54, 39-51).
 class CompensatedSum {
@@ -44,24 +46,36 @@ class CompensatedSum {
 
 }  // namespace
 
-void assign_masses(std::span<const double> log_weight, std::uint64_t particles, ParticleMasses& out) {
+void assign_masses(std::span<const double> log_weight, std::uint64_t particles, ParticleMasses& out,
+                   ThreadPool* threads) {
+  constexpr double infinity = std::numeric_limits<double>::infinity();
   const std::size_t n = log_weight.size();
   if (particles < 1 || particles > largest_particle_number)
     throw InputError(fmt::format("the number of particles must lie in 1..{}", largest_particle_number),
                      "thinning", fmt::format("{}", particles));
   if (n > std::numeric_limits<std::uint32_t>::max())
     throw InputError("too many sites for 32-bit indices", "thinning", fmt::format("{}", n));
-  const auto [largest, all_valid] = largest_log_weight(log_weight);
-  if (!all_valid || largest == -std::numeric_limits<double>::infinity()) refuse(log_weight);
+  std::vector<double>& scratch = out.scratch;
+  scratch.assign((n + block - 1) / block, -infinity);
+  for_blocks(threads, n, block, [&](std::size_t first, std::size_t count, std::size_t b) {
+    const auto [value, all_valid] = largest_log_weight(log_weight.subspan(first, count));
+    scratch[b] = all_valid ? value : infinity;
+  });
+  const double largest = n > 0 ? *std::max_element(scratch.begin(), scratch.end()) : -infinity;
+  if (!std::isfinite(largest)) refuse(log_weight);
 
   out.mass.resize(n);
+  scratch.resize((n + chunk - 1) / chunk);
+  for_blocks(threads, n, block, [&](std::size_t first, std::size_t count, std::size_t) {
+    std::array<double, chunk> w;
+    for (std::size_t i = first; i < first + count; i += chunk) {
+      const std::size_t some = std::min(chunk, first + count - i);
+      scratch[i / chunk] = relative_weights(log_weight.subspan(i, some), largest, w.data());
+      std::memcpy(out.mass.data() + i, w.data(), some * sizeof(double));  // as bits, until scaled
+    }
+  });
   CompensatedSum sum;
-  std::array<double, chunk> w;
-  for (std::size_t first = 0; first < n; first += chunk) {
-    const std::size_t count = std::min(chunk, n - first);
-    sum.add(relative_weights(log_weight.subspan(first, count), largest, w.data()));
-    std::memcpy(out.mass.data() + first, w.data(), count * sizeof(double));  // as bits, until scaled
-  }
+  for (const double s : scratch) sum.add(s);
   const double total = sum.value();
   out.particles = particles;
   out.fraction_bits = 63 - static_cast<int>(std::bit_width(particles));
@@ -69,11 +83,15 @@ void assign_masses(std::span<const double> log_weight, std::uint64_t particles, 
 
   // w_i <= 1 <= total, so a product is at most N 2^B < 2^63 up to rounding.
   const double scale = std::ldexp(static_cast<double>(particles), out.fraction_bits) / total;
-  std::uint64_t assigned = 0;
-  for (std::uint64_t& m : out.mass) {
-    m = static_cast<std::uint64_t>(static_cast<std::int64_t>(std::bit_cast<double>(m) * scale + 0.5));
-    assigned += m;
-  }
+  std::atomic<std::uint64_t> assigned = 0;
+  for_blocks(threads, n, block, [&](std::size_t first, std::size_t count, std::size_t) {
+    std::uint64_t here = 0;
+    for (std::uint64_t& m : std::span(out.mass).subspan(first, count)) {
+      m = static_cast<std::uint64_t>(static_cast<std::int64_t>(std::bit_cast<double>(m) * scale + 0.5));
+      here += m;
+    }
+    assigned += here;
+  });
   const auto heaviest =
       static_cast<std::size_t>(std::find(log_weight.begin(), log_weight.end(), largest) - log_weight.begin());
   out.mass[heaviest] += (particles << out.fraction_bits) - assigned;  // modulo 2^64: may subtract

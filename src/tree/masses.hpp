@@ -8,6 +8,8 @@
 #include <span>
 #include <vector>
 
+#include "wienertree/tree/parallel.hpp"
+
 namespace wienertree {
 
 struct ParticleMasses {
@@ -15,6 +17,7 @@ struct ParticleMasses {
   std::uint64_t particles = 0;      ///< N
   int fraction_bits = 0;            ///< B = 63 - bits of N, so that 2^62 <= N 2^B < 2^63
   double log_total = 0;             ///< log sum_i exp(log_weight_i)
+  std::vector<double> scratch;
 };
 
 inline constexpr std::uint64_t largest_particle_number = 0xffffffff;
@@ -28,7 +31,9 @@ inline constexpr std::uint64_t largest_particle_number = 0xffffffff;
 /// below 2^-64 of the total has m_i = 0. Buffers of `out` are reused.
 /// @throws RunError if no weight is positive, or one is NaN or +infinity (naming the first such site)
 /// @throws InputError if N is 0 or above largest_particle_number, or there are 2^32 sites or more
-void assign_masses(std::span<const double> log_weight, std::uint64_t particles, ParticleMasses& out);
+/// @param threads to work on, if any; the masses do not depend on it
+void assign_masses(std::span<const double> log_weight, std::uint64_t particles, ParticleMasses& out,
+                   ThreadPool* threads = nullptr);
 
 /// Splits `mass` over children of weights lambda_j > 0 (sum 1 up to rounding): m_j = [mass lambda_j], and the
 /// remainder (at most one unit a child and rounding) to the largest. The m_j sum to `mass` exactly.

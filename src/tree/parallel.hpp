@@ -1,5 +1,6 @@
 #pragma once
 /// A small persistent pool of threads for loops over blocks of nodes.
+#include <algorithm>
 #include <cstddef>
 #include <memory>
 #include <type_traits>
@@ -41,5 +42,17 @@ class ThreadPool {
   std::unique_ptr<Shared> shared_;
   std::size_t size_;
 };
+
+/// body(first, count, block) over n items in blocks of a size that does not depend on the pool, so that what
+/// a block leaves behind does not either. Without a pool, in the caller's thread.
+template <class Body>
+void for_blocks(ThreadPool* threads, std::size_t n, std::size_t block, Body body) {
+  const auto one = [&](std::size_t b, std::size_t) { body(b * block, std::min(block, n - b * block), b); };
+  const std::size_t blocks = (n + block - 1) / block;
+  if (threads != nullptr && blocks > 1)
+    threads->for_each(blocks, one);
+  else
+    for (std::size_t b = 0; b < blocks; ++b) one(b, 0);
+}
 
 }  // namespace wienertree

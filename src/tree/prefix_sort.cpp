@@ -1,6 +1,7 @@
 #include "wienertree/tree/prefix_sort.hpp"
 
 #include <array>
+#include <utility>
 
 namespace wienertree {
 namespace {
@@ -40,59 +41,94 @@ void merge(const std::uint64_t* a, std::size_t n_a, const std::uint64_t* b, std:
   std::merge(a, a_last, b, b_last, out);
 }
 
+// A part of a merge: no item of one part belongs among those of another.
+struct MergePart {
+  std::size_t first_a, last_a, first_b, last_b;
+};
+
+// Runs begin..middle-1 and middle..end-1 in `parts` parts, cut at equal steps of the first run.
+MergePart part_of_merge(std::span<const std::uint64_t> items, std::size_t begin, std::size_t middle,
+                        std::size_t end, std::size_t part, std::size_t parts) {
+  const auto cut_a = [&](std::size_t k) { return begin + (middle - begin) * k / parts; };
+  const auto cut_b = [&](std::size_t k) {
+    if (k == 0) return middle;
+    if (k == parts) return end;
+    const auto from = items.begin() + static_cast<std::ptrdiff_t>(middle);
+    const auto to = items.begin() + static_cast<std::ptrdiff_t>(end);
+    return static_cast<std::size_t>(std::lower_bound(from, to, items[cut_a(k)]) - items.begin());
+  };
+  return {cut_a(part), cut_a(part + 1), cut_b(part), cut_b(part + 1)};
+}
+
 void merge_runs(std::vector<std::uint64_t>& items, std::vector<std::uint64_t>& scratch, std::size_t runs,
-                std::array<std::size_t, most_runs + 1>& start) {
+                std::array<std::size_t, most_runs + 1>& start, ThreadPool* threads) {
+  constexpr std::size_t least_part = 4096;
   scratch.resize(items.size());
   while (runs > 1) {
-    std::size_t merged = 0;
-    for (std::size_t r = 0; r < runs; r += 2) {
-      const std::size_t first = start[r], middle = start[std::min(r + 1, runs)],
-                        last = start[std::min(r + 2, runs)];
-      merge(items.data() + first, middle - first, items.data() + middle, last - middle,
-            scratch.data() + first);
-      start[merged++] = first;
-    }
-    start[merged] = items.size();
-    runs = merged;
+    const std::size_t pairs = (runs + 1) / 2;
+    const std::size_t parts =
+        threads == nullptr || items.size() < least_part * pairs ? 1 : 2 * threads->size();
+    for_blocks(threads, pairs * parts, 1, [&](std::size_t task, std::size_t, std::size_t) {
+      const std::size_t r = 2 * (task / parts), begin = start[r], middle = start[std::min(r + 1, runs)];
+      const MergePart p =
+          part_of_merge(items, begin, middle, start[std::min(r + 2, runs)], task % parts, parts);
+      merge(items.data() + p.first_a, p.last_a - p.first_a, items.data() + p.first_b, p.last_b - p.first_b,
+            scratch.data() + p.first_a + (p.first_b - middle));
+    });
+    for (std::size_t k = 0; k < pairs; ++k) start[k] = start[2 * k];
+    start[pairs] = items.size();
+    runs = pairs;
     items.swap(scratch);
   }
 }
 
 constexpr std::size_t digit_bits = 11, buckets = std::size_t{1} << digit_bits, passes = 3;
 
-void radix_sort(std::vector<std::uint64_t>& items, std::vector<std::uint64_t>& scratch) {
+// Slices of the items are counted and placed side by side: slice k's items of a digit go behind those of the
+// slices before it, so that the order does not depend on the number of slices.
+void radix_sort(std::vector<std::uint64_t>& items, std::vector<std::uint64_t>& scratch, ThreadPool* threads) {
+  constexpr std::size_t most_slices = 16, least_slice = std::size_t{1} << 16;
   scratch.resize(items.size());
-  const auto digit = [](std::uint64_t item, std::size_t pass) {
-    return static_cast<std::size_t>(item >> (32 + pass * digit_bits)) & (buckets - 1);
-  };
-  std::array<std::array<std::uint32_t, buckets>, passes> place{};
-  for (const std::uint64_t item : items)
-    for (std::size_t pass = 0; pass < passes; ++pass) ++place[pass][digit(item, pass)];
+  const std::size_t wanted = threads == nullptr ? 1
+                                                : std::clamp(items.size() / least_slice, std::size_t{1},
+                                                             std::min(most_slices, threads->size()));
+  const std::size_t slice = (items.size() + wanted - 1) / wanted;
+  const std::size_t slices = (items.size() + slice - 1) / slice;
+  std::array<std::array<std::uint32_t, buckets>, most_slices> place;
   for (std::size_t pass = 0; pass < passes; ++pass) {
-    if (place[pass][digit(items[0], pass)] == items.size()) continue;
+    const auto digit = [pass](std::uint64_t item) {
+      return static_cast<std::size_t>(item >> (32 + pass * digit_bits)) & (buckets - 1);
+    };
+    for_blocks(threads, items.size(), slice, [&](std::size_t first, std::size_t count, std::size_t k) {
+      place[k].fill(0);
+      for (const std::uint64_t item : std::span(items).subspan(first, count)) ++place[k][digit(item)];
+    });
+    std::size_t like_first = 0;
+    for (std::size_t k = 0; k < slices; ++k) like_first += place[k][digit(items[0])];
+    if (like_first == items.size()) continue;
     std::uint32_t below = 0;
-    for (std::uint32_t& p : place[pass]) {
-      const std::uint32_t here = p;
-      p = below;
-      below += here;
-    }
-    for (const std::uint64_t item : items) scratch[place[pass][digit(item, pass)]++] = item;
+    for (std::size_t d = 0; d < buckets; ++d)
+      for (std::size_t k = 0; k < slices; ++k) below += std::exchange(place[k][d], below);
+    for_blocks(threads, items.size(), slice, [&](std::size_t first, std::size_t count, std::size_t k) {
+      for (const std::uint64_t item : std::span(items).subspan(first, count))
+        scratch[place[k][digit(item)]++] = item;
+    });
     items.swap(scratch);
   }
 }
 
 }  // namespace
 
-void sort_items(std::vector<std::uint64_t>& items, std::vector<std::uint64_t>& scratch) {
+void sort_items(std::vector<std::uint64_t>& items, std::vector<std::uint64_t>& scratch, ThreadPool* threads) {
   std::array<std::size_t, most_runs + 1> start;
   const std::size_t runs = items.empty() ? 1 : find_runs(items, start);
   if (runs == 1) return;
   if (runs > 1)
-    merge_runs(items, scratch, runs, start);
+    merge_runs(items, scratch, runs, start, threads);
   else if (items.size() < buckets / 2)
     std::sort(items.begin(), items.end());
   else
-    radix_sort(items, scratch);
+    radix_sort(items, scratch, threads);
 }
 
 }  // namespace wienertree

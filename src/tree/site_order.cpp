@@ -13,6 +13,8 @@ namespace wienertree {
 namespace {
 
 constexpr std::size_t least_sample = 64, largest_sample = 1024;
+constexpr std::size_t block = 16384;  ///< sites a task; a multiple of hilbert_block
+static_assert(block % hilbert_block == 0);
 
 // Appends every site of finite log-weight that `site_at` names, without branching.
 template <class SiteAt>
@@ -76,7 +78,9 @@ void SiteOrdering::spatial(const Sites& sites, const ParticleMasses& masses,
     line_items(sites, visit);
   else
     curve_items(sites, visit);
-  for (std::size_t i = 0; i < visit.size(); ++i) visit[i] = static_cast<std::uint32_t>(items_[i]);
+  for_blocks(sites.threads, visit.size(), block, [&](std::size_t first, std::size_t count, std::size_t) {
+    for (std::size_t i = first; i < first + count; ++i) visit[i] = static_cast<std::uint32_t>(items_[i]);
+  });
 }
 
 // Sites at equal steps of mass: a sample of the weighted measure.
@@ -136,11 +140,14 @@ bool SiteOrdering::make_axis(const Sites& sites, std::span<const std::uint32_t> 
 void SiteOrdering::line_items(const Sites& sites, std::span<const std::uint32_t> live) {
   const std::span<const double> x = sites.x.component(axes_[0].component);
   const auto [component, low, scale] = axes_[0];
-  for (std::size_t i = 0; i < live.size(); ++i)
-    items_[i] = packed_item(cell(x[live[i]], low, scale, 0x1.0p32), live[i]);
-  sort_items(items_, scratch_);
+  for_blocks(sites.threads, live.size(), block, [&](std::size_t first, std::size_t count, std::size_t) {
+    for (std::size_t i = first; i < first + count; ++i)
+      items_[i] = packed_item(cell(x[live[i]], low, scale, 0x1.0p32), live[i]);
+  });
+  sort_items(items_, scratch_, sites.threads);
   settle_equal_prefixes(
-      items_, [x](std::uint32_t a, std::uint32_t b) { return x[a] < x[b] || (x[a] == x[b] && a < b); });
+      items_, [x](std::uint32_t a, std::uint32_t b) { return x[a] < x[b] || (x[a] == x[b] && a < b); },
+      sites.threads);
 }
 
 void SiteOrdering::curve_items(const Sites& sites, std::span<const std::uint32_t> live) {
@@ -149,25 +156,31 @@ void SiteOrdering::curve_items(const Sites& sites, std::span<const std::uint32_t
   const double cells = std::ldexp(1.0, static_cast<int>(bits));
   const unsigned unused = 64 - static_cast<unsigned>(d) * bits;
   keys_.resize(sites.log_weight.size());
-  std::array<std::uint64_t, hilbert_block> key;
-  for (std::size_t first = 0; first < live.size(); first += hilbert_block) {
-    const std::size_t n = std::min(hilbert_block, live.size() - first);
-    for (std::size_t i = 0; i < d; ++i) {
-      const std::span<const double> x = sites.x.component(axes_[i].component);
-      for (std::size_t l = 0; l < n; ++l)
-        cells_[i][l] = cell(x[live[first + l]], axes_[i].low, axes_[i].scale, cells);
+  for_blocks(sites.threads, live.size(), block, [&](std::size_t begin, std::size_t count, std::size_t) {
+    HilbertAxes cells_of_axis;
+    std::array<std::uint64_t, hilbert_block> key;
+    for (std::size_t first = begin; first < begin + count; first += hilbert_block) {
+      const std::size_t n = std::min(hilbert_block, begin + count - first);
+      for (std::size_t i = 0; i < d; ++i) {
+        const std::span<const double> x = sites.x.component(axes_[i].component);
+        for (std::size_t l = 0; l < n; ++l)
+          cells_of_axis[i][l] = cell(x[live[first + l]], axes_[i].low, axes_[i].scale, cells);
+      }
+      hilbert_keys(cells_of_axis, d, bits, key);
+      for (std::size_t l = 0; l < n; ++l) {
+        const std::uint64_t leading = key[l] << unused;
+        keys_[live[first + l]] = leading;
+        items_[first + l] = packed_item(static_cast<std::uint32_t>(leading >> 32), live[first + l]);
+      }
     }
-    hilbert_keys(cells_, d, bits, key);
-    for (std::size_t l = 0; l < n; ++l) {
-      const std::uint64_t leading = key[l] << unused;
-      keys_[live[first + l]] = leading;
-      items_[first + l] = packed_item(static_cast<std::uint32_t>(leading >> 32), live[first + l]);
-    }
-  }
-  sort_items(items_, scratch_);
-  settle_equal_prefixes(items_, [this](std::uint32_t a, std::uint32_t b) {
-    return keys_[a] < keys_[b] || (keys_[a] == keys_[b] && a < b);
   });
+  sort_items(items_, scratch_, sites.threads);
+  settle_equal_prefixes(
+      items_,
+      [this](std::uint32_t a, std::uint32_t b) {
+        return keys_[a] < keys_[b] || (keys_[a] == keys_[b] && a < b);
+      },
+      sites.threads);
 }
 
 }  // namespace wienertree

@@ -3,7 +3,6 @@
 /// neighbouring sites, and the error of a mean falls faster than N^{-1/2}: Hammersley's remark for d = 1;
 /// Gerber, Chopin (2015), "Sequential quasi Monte Carlo", J. R. Stat. Soc. B 77, 509-579, for Hilbert's
 /// curve.
-#include <array>
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -45,7 +44,6 @@ class SiteOrdering {
   std::vector<std::uint32_t> sample_;
   std::vector<double> sample_values_;
   std::vector<std::uint64_t> items_, scratch_, keys_;
-  HilbertAxes cells_{};
 };
 
 }  // namespace wienertree

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "wienertree/model/batch.hpp"
+#include "wienertree/tree/parallel.hpp"
 #include "wienertree/tree/random.hpp"
 
 namespace wienertree {
@@ -41,7 +42,8 @@ struct Selection {
 struct Sites {
   ConstBatchView x;
   std::span<const double> log_weight;
-  std::size_t parents = 0;  ///< 0: visit in storage order
+  std::size_t parents = 0;        ///< 0: visit in storage order
+  ThreadPool* threads = nullptr;  ///< to work on, if any; results do not depend on it
 };
 
 class Thinning {
