@@ -150,7 +150,7 @@ void GaussianMixtureFilter::step(const ObservationWindow& window, std::size_t fi
   if (continuous && functional_->uses_end()) {
     scratch.end_sensor.reshape(k, count);
     model_.fields->sensor(next, scratch.end_sensor);
-    functional_->at_end(window, scratch.sensor, scratch.end_sensor, log_weight);
+    functional_->at_end(window, scratch.sensor, scratch.derivative, scratch.end_sensor, log_weight);
   }
 }
 

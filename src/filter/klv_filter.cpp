@@ -100,17 +100,18 @@ void KlvFilter::weigh(const ObservationWindow& window) {
   constexpr std::size_t block = 1024;
   const std::size_t blocks = (parents + block - 1) / block;
   for (Batch& scratch : child_sensor_) scratch.reshape(sensor_.components(), std::min(block, parents));
-  grower_.threads().for_each(
-      options_.formula.paths.size() * blocks, [&](std::size_t task, std::size_t thread) {
-        const std::size_t first = task % blocks * block, count = std::min(block, parents - first);
-        const std::size_t child = task / blocks * parents + first;
-        const std::span<double> w = {weight.data() + child, count};
-        for (std::size_t n = 0; n < count; ++n) w[n] += start_term_[first + n];
-        if (!functional_->uses_end()) return;
-        const BatchView h1 = child_sensor_[thread].view().nodes(0, count);
-        model_.fields->sensor(children_.states.view().nodes(child, count), h1);
-        functional_->at_end(window, sensor_.view().nodes(first, count), h1, w);
-      });
+  grower_.threads().for_each(options_.formula.paths.size() * blocks, [&](std::size_t task,
+                                                                         std::size_t thread) {
+    const std::size_t first = task % blocks * block, count = std::min(block, parents - first);
+    const std::size_t child = task / blocks * parents + first;
+    const std::span<double> w = {weight.data() + child, count};
+    for (std::size_t n = 0; n < count; ++n) w[n] += start_term_[first + n];
+    if (!functional_->uses_end()) return;
+    const BatchView h1 = child_sensor_[thread].view().nodes(0, count);
+    model_.fields->sensor(children_.states.view().nodes(child, count), h1);
+    const BatchView G = functional_->uses_derivative() ? derivative_.view().nodes(first, count) : BatchView{};
+    functional_->at_end(window, sensor_.view().nodes(first, count), G, h1, w);
+  });
 }
 
 void KlvFilter::thin(const ObservationWindow& window) {

@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "wienertree/filter/row_integrals.hpp"
+
 namespace wienertree {
 namespace {
 
@@ -85,39 +87,33 @@ void ObservationWindows::get(std::size_t j, ObservationWindow& out) const {
 }
 
 void integrate_rows(ObservationWindow& window, std::size_t k) {
-  const std::size_t rows = window.rows();
+  const std::size_t gaps = window.rows() - 1;
   const double s = window.length();
-  const double* last = window.row_values.data() + (rows - 1) * k;
-  window.increment.resize(k);
-  window.integral.assign(k, 0.0);
+  const double *t = window.row_times.data(), *y = window.row_values.data();
+  for (auto* v : {&window.increment, &window.integral, &window.bridge_start, &window.bridge_end})
+    v->resize(k);
   window.covariation.assign(k * k, 0.0);
-  for (std::size_t i = 0; i < k; ++i) window.increment[i] = last[i] - window.row_values[i];
-  if (rows == 2) {
+  for (std::size_t i = 0; i < k; ++i) window.increment[i] = y[gaps * k + i] - y[i];
+  if (gaps == 1) {
     for (std::size_t i = 0; i < k; ++i) {
       window.integral[i] = s * window.increment[i] / 2;
       window.covariation[i * k + i] = s * s / 6;
+      window.bridge_start[i] = window.bridge_end[i] = s * s * window.increment[i] / 24;
     }
     return;
   }
-  double bridge = 0;  // diagonal part: sum delta^2/6 - sum delta^3/(12 s)
-  for (std::size_t r = 0; r + 1 < rows; ++r) {
-    const double delta = window.row_times[r + 1] - window.row_times[r];
-    const double* a = window.row_values.data() + r * k;
-    const double* b = a + k;
-    bridge += delta * delta / 6 - delta * delta * delta / (12 * s);
-    for (std::size_t i = 0; i < k; ++i) {
-      const double ui = last[i] - a[i], vi = last[i] - b[i];
-      window.integral[i] += delta * (ui + vi) / 2;
-      for (std::size_t l = 0; l <= i; ++l) {
-        const double ul = last[l] - a[l], vl = last[l] - b[l];
-        window.covariation[i * k + l] += delta * (ui * ul / 3 + (ui * vl + vi * ul) / 6 + vi * vl / 3);
-      }
-    }
+  for (std::size_t i = 0; i < k; ++i) {
+    const RowIntegrals r = row_integrals(t, y + i, k, gaps);
+    window.integral[i] = r.i0;
+    window.bridge_start[i] = s / 3 * r.i0 - r.j1 + r.j2 / (2 * s);
+    window.bridge_end[i] = s / 6 * r.i0 - r.j2 / (2 * s);
   }
+  const double bridge = row_bridge_variance(t, gaps);
   for (std::size_t i = 0; i < k; ++i)
     for (std::size_t l = 0; l <= i; ++l) {
       double& c = window.covariation[i * k + l];
-      c += (i == l ? bridge : 0.0) - window.integral[i] * window.integral[l] / s;
+      c = row_products(t, y + i, y + l, k, gaps) - window.integral[i] * window.integral[l] / s;
+      if (i == l) c += bridge;
       window.covariation[l * k + i] = c;
     }
 }

@@ -12,7 +12,11 @@ namespace wienertree {
 ///     increment  D = Y_end - Y_start                                  (k)
 ///     integral   I = int_start^end U_u du                             (k)
 ///     covariation C = int U_u U_u^T du - I I^T / s,  s = end - start   (k x k, row-major)
-/// I and C are conditional expectations given the rows: Y between two rows is a Brownian bridge, whose
+/// and, b a Brownian bridge on [0,s], the covariances of int b dY with int (1 - u/s) b_u du and with int (u/s)
+/// b_u du, which are
+///     bridge_start = (s/3) I - J_1 + J_2/(2s),   bridge_end = (s/6) I - J_2/(2s),
+///     J_m = int (u - start)^m U_u du                                   (k each).
+/// All are conditional expectations given the rows: Y between two rows is a Brownian bridge, whose
 /// variance adds delta^2/6 Id to int U U^T and delta^3/12 Id to the covariance of I for each gap delta.
 /// Without a row strictly inside, I = sD/2 and C = (s^2/6) Id (its unconditional mean), which turns the
 /// second-order functional into the trapezoid.
@@ -22,7 +26,7 @@ struct ObservationWindow {
 
   std::span<const double> row_times;   ///< continuous: rows of [start, end], first and last included
   std::span<const double> row_values;  ///< their values, rows x k
-  std::vector<double> increment, integral, covariation;
+  std::vector<double> increment, integral, covariation, bridge_start, bridge_end;
 
   /// Discrete: the observation to weigh by, or empty. `at_start`: it is a function of the state at `start`
   /// (timing "previous"), else of the state at `end`. A window of length zero weighs without moving.

@@ -4,6 +4,7 @@
 #include <catch2/catch.hpp>
 #include <cmath>
 #include <functional>
+#include <numbers>
 
 #include "filter/text_problems.hpp"
 #include "wienertree/cubature/construct.hpp"
@@ -49,7 +50,7 @@ std::array<double, 2> h(Point a) { return {a.x * a.z, std::sin(a.x)}; }
 double log_weight(FunctionalMethod method, const ObservationWindow& w, Point a, Point b) {
   const auto h0 = h(a), h1 = h(b);
   const double s = w.length();
-  double quadratic = 0, picard = 0, trapezoid = 0, second = 0;
+  double quadratic = 0, picard = 0, trapezoid = 0, second = 0, norm = 0;
   for (std::size_t i = 0; i < 2; ++i) {
     quadratic += s / 6 * (h0[i] * h0[i] + h0[i] * h1[i] + h1[i] * h1[i]);
     picard += h0[i] * w.increment[i] - s / 2 * h0[i] * h0[i];
@@ -60,9 +61,15 @@ double log_weight(FunctionalMethod method, const ObservationWindow& w, Point a, 
   const double G[2][2] = {{0.6 * a.z + 0.1 * a.x, 0.5 * a.x}, {0.6 * std::cos(a.x), 0}};
   double trace = 0;
   for (std::size_t i = 0; i < 2; ++i)
-    for (std::size_t l = 0; l < 2; ++l)
-      for (std::size_t r = 0; r < 2; ++r)
-        trace += G[i][r] * G[l][r] * (w.covariation[i * 2 + l] - (i == l ? s * s / 6 : 0)) / 2;
+    for (std::size_t l = 0; l < 2; ++l) {
+      const double M = w.covariation[i * 2 + l] - (i == l ? s * s / 6 : 0) - w.bridge_start[i] * h0[l] -
+                       w.bridge_end[i] * h1[l] - w.bridge_start[l] * h0[i] - w.bridge_end[l] * h1[i] +
+                       s * s * s / 45 * (h0[i] * h0[l] + h1[i] * h1[l]) +
+                       7 * s * s * s / 360 * (h0[i] * h1[l] + h1[i] * h0[l]);
+      for (std::size_t r = 0; r < 2; ++r) trace += G[i][r] * G[l][r] * M / 2;
+      norm += G[i][l] * G[i][l];
+    }
+  trace /= 1 + s * s * norm / (std::numbers::pi * std::numbers::pi);
   if (method == FunctionalMethod::picard) return picard;
   if (method == FunctionalMethod::trapezoid) return trapezoid - quadratic;
   return second - quadratic + trace;

@@ -32,6 +32,8 @@ TEST_CASE("increments alone give the unconditional integral and covariation") {
   CHECK(w.integral[0] == Approx(0.25));
   CHECK(w.covariation[0] == Approx(0.25 / 6));
   CHECK(w.covariation[1] == 0.0);
+  CHECK(w.bridge_start[0] == Approx(0.25 / 24));  // U = D (1 - u/s): s^2 D/24
+  CHECK(w.bridge_end[1] == Approx(-0.25 / 24));
 }
 
 TEST_CASE("on many rows integral and covariation converge to their definition") {
@@ -53,6 +55,35 @@ TEST_CASE("on many rows integral and covariation converge to their definition") 
   CHECK(w.covariation[1] == Approx(5.0 / 12 - 1.0 / 3).margin(1e-6));
   CHECK(w.covariation[2] == w.covariation[1]);
   CHECK(w.covariation[3] == Approx(8.0 / 15 - 4.0 / 9 + bridge).margin(1e-6));
+  // K, the Brownian bridge's covariance operator on [0,1], takes 1 to u(1-u)/2 and u to (u/6)(1-u^2):
+  // int (K u) dY = 1/24, 2/45 and int (K 1) dY = 1/12, 1/12.
+  CHECK(w.bridge_end[0] == Approx(1.0 / 24).margin(1e-6));
+  CHECK(w.bridge_end[1] == Approx(2.0 / 45).margin(1e-6));
+  CHECK(w.bridge_start[0] == Approx(1.0 / 24).margin(1e-6));
+  CHECK(w.bridge_start[1] == Approx(1.0 / 12 - 2.0 / 45).margin(1e-6));
+}
+
+TEST_CASE("rows at unequal times, one component among several") {
+  // A linear component has the same integrals whatever the rows are, and 19 gaps are two full blocks and a
+  // rest.
+  std::vector<double> t{2.0}, y{0.0, 1.0, 0.0};
+  for (int r = 1; r < 20; ++r) {
+    t.push_back(t.back() + 0.01 * (1 + r % 4));
+    const double u = t.back() - 2.0;
+    y.insert(y.end(), {u * u, 1.0 - 3 * u, std::sin(9 * u)});
+  }
+  const auto path = path_of(t, y);
+  const auto w = only_window(path);
+  const double s = w.length(), D = -3 * s;
+  double bridge = 0;
+  for (std::size_t r = 0; r + 1 < t.size(); ++r) {
+    const double delta = t[r + 1] - t[r];
+    bridge += delta * delta / 6 - delta * delta * delta / (12 * s);
+  }
+  CHECK(w.integral[1] == Approx(s * D / 2).epsilon(1e-13));
+  CHECK(w.covariation[4] == Approx(D * D * s / 12 + bridge).epsilon(1e-12));
+  CHECK(w.bridge_start[1] == Approx(s * s * D / 24).epsilon(1e-12));
+  CHECK(w.bridge_end[1] == Approx(s * s * D / 24).epsilon(1e-12));
 }
 
 TEST_CASE("coarse rows give the conditional expectation of what fine rows give") {
