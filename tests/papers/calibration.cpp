@@ -6,7 +6,8 @@
 /// Null hypothesis of each row: uniform. Draws: the number below, in 10 bins. Pearson's statistic has about a
 /// chi-square law with 9 degrees of freedom; a row fails where that has a tail below 1e-7, so that the 12
 /// rows together raise fewer than 2e-6 false alarms. With 600 draws a standard deviation that is wrong by a
-/// factor of 1.6 fails; with 6000 (label slow) one that is wrong by 1.15.
+/// factor of 1.5 makes the statistic about 120, where the bound is 52; one wrong by 1.15 about 165 with 6000
+/// (label slow).
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
