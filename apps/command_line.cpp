@@ -135,15 +135,16 @@ std::size_t choose(const std::string& option, const std::string& value,
                    option, value);
 }
 
+std::pair<std::string, double> parse_assignment(const std::string& text, const std::string& option) {
+  const std::size_t equals = text.find('=');
+  if (equals == std::string::npos || equals == 0) throw InputError("must be NAME=VALUE", option, text);
+  const std::string name = text.substr(0, equals);
+  return {name, finite_number(option + " " + name, text.substr(equals + 1))};
+}
+
 void add_assignments(CLI::App& app, Assignments& target) {
   const auto parse = [&target](const std::vector<std::string>& assignments) {
-    for (const std::string& assignment : assignments) {
-      const std::size_t equals = assignment.find('=');
-      if (equals == std::string::npos || equals == 0)
-        throw InputError("must be NAME=VALUE", "--set", assignment);
-      const std::string name = assignment.substr(0, equals);
-      target.emplace_back(name, finite_number("--set " + name, assignment.substr(equals + 1)));
-    }
+    for (const std::string& assignment : assignments) target.push_back(parse_assignment(assignment, "--set"));
   };
   app.add_option_function<std::vector<std::string>>("--set", parse,
                                                     "Set a parameter of the model; may be repeated")

@@ -71,6 +71,8 @@ CLI::Option* add_choice(CLI::App& app, const std::string& name, std::optional<E>
 
 /// `--set NAME=VALUE`, repeatable.
 using Assignments = std::vector<std::pair<std::string, double>>;
+/// "NAME=VALUE". @throws InputError naming `option`
+std::pair<std::string, double> parse_assignment(const std::string& text, const std::string& option);
 void add_assignments(CLI::App& app, Assignments& target);
 
 /// Parses and runs; what a subcommand does is done by its callback. Never throws: errors become one line on

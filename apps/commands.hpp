@@ -6,6 +6,7 @@ namespace wienertree::app {
 
 void add_simulate_command(CLI::App& program);
 void add_filter_command(CLI::App& program);
+void add_compare_command(CLI::App& program);
 void add_formulas_command(CLI::App& program);
 void add_model_command(CLI::App& program);
 void add_tree_command(CLI::App& program);

@@ -11,11 +11,15 @@
 namespace wienertree::app {
 namespace {
 
-const Choices<FilterMethod> methods = {
-    {"klv", FilterMethod::klv},       {"full-tree", FilterMethod::full_tree},
-    {"euler", FilterMethod::euler},   {"gaussian-mixture", FilterMethod::gaussian_mixture},
-    {"benes", FilterMethod::benes},   {"kalman-bucy", FilterMethod::kalman_bucy},
-    {"kalman", FilterMethod::kalman}, {"grid", FilterMethod::grid}};
+const Choices<FilterMethod> methods = {{"klv", FilterMethod::klv},
+                                       {"full-tree", FilterMethod::full_tree},
+                                       {"euler", FilterMethod::euler},
+                                       {"gaussian-mixture", FilterMethod::gaussian_mixture},
+                                       {"weighted", FilterMethod::weighted},
+                                       {"benes", FilterMethod::benes},
+                                       {"kalman-bucy", FilterMethod::kalman_bucy},
+                                       {"kalman", FilterMethod::kalman},
+                                       {"grid", FilterMethod::grid}};
 const Choices<ThinningMethod> thinnings = {{"none", ThinningMethod::none},
                                            {"tbba", ThinningMethod::tbba},
                                            {"multinomial", ThinningMethod::multinomial},
@@ -35,9 +39,10 @@ const Choices<FlowMethod> flows = {{"auto", FlowMethod::automatic},
                                    {"cvode", FlowMethod::cvode}};
 const Choices<OnNodeFailure> failures = {{"stop", OnNodeFailure::stop}, {"drop", OnNodeFailure::drop}};
 
-// Whether a filter moves particles that are resampled.
-bool resamples(FilterMethod method) {
-  return method == FilterMethod::euler || method == FilterMethod::gaussian_mixture;
+// Whether a filter moves particles by random numbers.
+bool moves_particles(FilterMethod method) {
+  return method == FilterMethod::euler || method == FilterMethod::gaussian_mixture ||
+         method == FilterMethod::weighted;
 }
 
 // An option given where it means nothing is a mistake worth telling.
@@ -78,10 +83,11 @@ void refuse_inapplicable(const FilterArguments& a, const Model& model, FilterMet
   refuse_if(a.beta && method != FilterMethod::gaussian_mixture, "--beta", with_method);
   refuse_if(a.functional && model.observation != ObservationKind::continuous, "--functional",
             "has meaning only for continuous observations");
-  if (resamples(method)) {
+  if (moves_particles(method)) {
     refuse_tree_options(a, with_method);
     refuse_if(a.thin == ThinningMethod::recombination, "--thin",
               "recombination " + with_method + ", which counts particles");
+    refuse_if(a.thin && method == FilterMethod::weighted, "--thin", with_method + ", which never resamples");
     refuse_if(thin == ThinningMethod::none && method == FilterMethod::gaussian_mixture, "--thin",
               "none " + with_method + ", whose corrections draw offspring");
     refuse_if(a.order && thin == ThinningMethod::none, "--order", with_thinning);
@@ -124,7 +130,7 @@ ThinningMethod thinning_of(const FilterArguments& a, FilterMethod method) {
 // Recombination needs few nodes, since it keeps moments; random thinning many.
 std::size_t default_nodes(FilterMethod method, ThinningMethod thin, std::size_t dimension) {
   if (method == FilterMethod::grid) return FilterOptions{}.grid_points;
-  if (method == FilterMethod::euler) return 10000;
+  if (method == FilterMethod::euler || method == FilterMethod::weighted) return 10000;
   if (method == FilterMethod::gaussian_mixture) return 1000;
   if (thin == ThinningMethod::recombination) return dimension == 1 ? 60 : dimension == 2 ? 300 : 600;
   return dimension == 1 ? 1000 : 10000;
@@ -198,7 +204,7 @@ std::optional<FilterMethod> exact_method(const Model& model) {
 std::string method_name(FilterMethod method) { return name_of(methods, method); }
 
 bool keeps_nodes(FilterMethod method) {
-  return method == FilterMethod::klv || method == FilterMethod::full_tree || resamples(method);
+  return method == FilterMethod::klv || method == FilterMethod::full_tree || moves_particles(method);
 }
 
 FilterSetup filter_setup(const FilterArguments& a, const Model& model) {
@@ -212,7 +218,7 @@ FilterSetup filter_setup(const FilterArguments& a, const Model& model) {
       a.nodes.value_or(default_nodes(o.method, o.thinning.method, model.reported_dimension()));
   (o.method == FilterMethod::grid ? o.grid_points : o.nodes) = nodes;
   if (!keeps_nodes(o.method)) return setup;
-  if (!resamples(o.method))
+  if (!moves_particles(o.method))
     o.formula = choose_formula(degree_for(a, model), a.formula, model.noise_dimension());
   o.thinning.order = a.order.value_or(SiteOrder::spatial);
   o.thinning.recombination_degree = static_cast<int>(a.recombination_degree.value_or(0));
@@ -230,7 +236,7 @@ FilterSetup filter_setup(const FilterArguments& a, const Model& model) {
   o.threads =
       static_cast<unsigned>(a.threads.value_or(many ? std::max(1U, std::thread::hardware_concurrency()) : 1));
   setup.launches = static_cast<std::uint32_t>(a.launches.value_or(1));
-  setup.random = resamples(o.method) ||
+  setup.random = moves_particles(o.method) ||
                  (o.method == FilterMethod::klv && o.thinning.method != ThinningMethod::recombination);
   return setup;
 }
@@ -248,8 +254,9 @@ Json options_in_force(const FilterSetup& setup, const Model& model) {
   }
   if (o.method != FilterMethod::full_tree) {
     json["nodes"] = o.nodes;
-    json["thin"] = name_of(thinnings, o.thinning.method);
-    if (setup.random) json["order"] = name_of(orders, o.thinning.order);
+    if (o.method != FilterMethod::weighted) json["thin"] = name_of(thinnings, o.thinning.method);
+    if (setup.random && o.thinning.method != ThinningMethod::none)
+      json["order"] = name_of(orders, o.thinning.order);
     if (o.thinning.recombination_degree > 0) json["recombination-degree"] = o.thinning.recombination_degree;
   }
   if (o.method == FilterMethod::klv) json["prune-weights"] = name_of(prunings, o.prune_weights);
@@ -278,6 +285,8 @@ std::string describe(const FilterSetup& setup) {
   if (o.method == FilterMethod::grid) return fmt::format("grid filter, {} cells", o.nodes);
   if (!keeps_nodes(o.method)) return "exact " + method_name(o.method) + " filter";
   if (o.method == FilterMethod::full_tree) return fmt::format("full tree, degree {}", o.formula.degree);
+  if (o.method == FilterMethod::weighted)
+    return fmt::format("weighted particle filter, {} particles", o.nodes);
   const char* what = o.method == FilterMethod::euler              ? "particles"
                      : o.method == FilterMethod::gaussian_mixture ? "Gaussians"
                                                                   : "nodes";

@@ -75,7 +75,7 @@ std::string draw(Picture picture, const FilterContext& c, const FilterRun& run,
 
 Table table_of(const FilterContext& c, const FilterRun& run) {
   const bool several = c.setup.launches > 1;
-  Table table{filter_columns(c.model, c.highest_moment, several), {}};
+  Table table{filter_columns(c.model, c.setup, c.highest_moment), {}};
   for (const LaunchesSummary& row : run.rows) table.rows.push_back(filter_row(row, several));
   return table;
 }
@@ -107,7 +107,7 @@ void filter_and_write(const FilterCommandArguments& a) {
   const bool follow = windows->streams() && csv && output.target() == "-";
   FilterRequest request{highest_moment, a.density_at, !a.quiet, {}};
   if (follow) {
-    write_to_stdout(csv_header(filter_columns(model, highest_moment, several)));
+    write_to_stdout(csv_header(filter_columns(model, setup, highest_moment)));
     request.observe = [several](const LaunchesSummary& row) {
       write_to_stdout(csv_row(filter_row(row, several)));
     };

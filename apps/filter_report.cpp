@@ -73,6 +73,25 @@ std::string evidence_line(const FilterContext& c, const FilterRun& run) {
   return text + '\n';
 }
 
+std::string ratio_lines(const FilterRun& run) {
+  const std::optional<LikelihoodRatio>& ratio = run.rows.back().ratio;
+  if (!ratio) return {};
+  std::string text = fmt::format(
+      "  against noise alone: log Bayes factor {:.6f}, log variance of the likelihood ratio {:.6g}, {:.4g} "
+      "effective "
+      "particles\n",
+      ratio->log_mean, ratio->log_variance, ratio->effective_size);
+  const auto collapsed = [](const LaunchesSummary& row) { return row.ratio && row.ratio->collapsed(); };
+  const auto first = std::find_if(run.rows.begin(), run.rows.end(), collapsed);
+  if (first != run.rows.end())
+    text += fmt::format(
+        "  warning: the weights collapsed at t = {:g}: fewer than 10 effective particles, so that what is "
+        "reported from "
+        "then on rests on a few of them\n",
+        first->mean.time);
+  return text;
+}
+
 std::string work_line(const FilterContext& c, const FilterRun& run, double seconds) {
   const FilterStatistics& s = run.statistics;
   std::string text;
@@ -90,7 +109,7 @@ std::string work_line(const FilterContext& c, const FilterRun& run, double secon
 
 }  // namespace
 
-std::vector<std::string> filter_columns(const Model& model, int highest_moment, bool several_launches) {
+std::vector<std::string> filter_columns(const Model& model, const FilterSetup& setup, int highest_moment) {
   std::vector<std::string> columns = {"t"};
   for (const char* prefix : {"mean_", "sd_"})
     for (const std::string& state : states_of(model)) columns.push_back(prefix + state);
@@ -99,7 +118,9 @@ std::vector<std::string> filter_columns(const Model& model, int highest_moment, 
   for (const char* name : {"log_evidence", "nodes", "ess"}) columns.emplace_back(name);
   for (int k = 2; k <= highest_moment; ++k)
     for (const std::string& state : states_of(model)) columns.push_back(fmt::format("m{}_{}", k, state));
-  if (!several_launches) return columns;
+  if (setup.options.method == FilterMethod::weighted)
+    for (const char* name : {"log_bayes_factor", "log_variance"}) columns.emplace_back(name);
+  if (setup.launches == 1) return columns;
   for (const std::string& state : states_of(model)) columns.push_back("mc_sd_" + state);
   columns.emplace_back("mc_sd_log_evidence");
   return columns;
@@ -114,6 +135,7 @@ std::vector<double> filter_row(const LaunchesSummary& summary, bool several_laun
   row.insert(row.end(), {s.log_evidence, summary.nodes, s.ess});
   for (std::size_t k = 0; k < (s.moments.empty() ? 0 : s.moments.front().size()); ++k)
     for (const std::vector<double>& moments : s.moments) row.push_back(moments[k]);
+  if (summary.ratio) row.insert(row.end(), {summary.ratio->log_mean, summary.ratio->log_variance});
   if (!several_launches) return row;
   row.insert(row.end(), summary.mean_sd.begin(), summary.mean_sd.end());
   row.push_back(summary.log_evidence_sd);
@@ -152,7 +174,7 @@ Json filter_report(const FilterContext& c, const FilterRun& run) {
 
 std::string filter_summary(const FilterContext& context, const FilterRun& run, double seconds) {
   return what_was_run(context, run) + final_posterior(context, run) + evidence_line(context, run) +
-         work_line(context, run, seconds);
+         ratio_lines(run) + work_line(context, run, seconds);
 }
 
 }  // namespace wienertree::app

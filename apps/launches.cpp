@@ -27,6 +27,14 @@ double deviation(const std::vector<PosteriorSummary>& launches, Get get) {
 
 }  // namespace
 
+double log_average(std::span<const double> logarithms) {
+  const double largest = *std::max_element(logarithms.begin(), logarithms.end());
+  if (largest == -INFINITY) return largest;
+  double sum = 0;
+  for (const double l : logarithms) sum += std::exp(l - largest);
+  return largest + std::log(sum / static_cast<double>(logarithms.size()));
+}
+
 Launches::Launches(const Model& model, const FilterSetup& setup)
     : components_(model.reported_dimension()), summaries_(setup.launches) {
   FilterOptions options = setup.options;
@@ -41,6 +49,7 @@ void Launches::advance(const ObservationWindow& window) {
 void Launches::summarise(double time, int highest_moment, LaunchesSummary& out) {
   for (std::size_t m = 0; m < filters_.size(); ++m)
     wienertree::summarise(filters_[m]->posterior(), components_, highest_moment, summaries_[m]);
+  out.ratio = average_ratio();
   out.mean = summaries_.front();
   out.mean.time = time;
   out.nodes = static_cast<double>(out.mean.nodes);
@@ -57,14 +66,33 @@ void Launches::summarise(double time, int highest_moment, LaunchesSummary& out) 
     out.mean_sd[i] = deviation(summaries_, [&](const PosteriorSummary& s) { return s.mean[i]; });
   }
   const auto log_evidence = [](const PosteriorSummary& s) { return s.log_evidence; };
-  double largest = -INFINITY;
-  for (const PosteriorSummary& s : summaries_) largest = std::max(largest, s.log_evidence);
-  out.mean.log_evidence =
-      largest +
-      std::log(average(summaries_, [&](const auto& s) { return std::exp(s.log_evidence - largest); }));
+  std::vector<double> log_evidences;
+  for (const PosteriorSummary& s : summaries_) log_evidences.push_back(s.log_evidence);
+  out.mean.log_evidence = log_average(log_evidences);
   out.log_evidence_sd = deviation(summaries_, log_evidence);
   out.mean.ess = average(summaries_, [](const auto& s) { return s.ess; });
   out.nodes = average(summaries_, [](const auto& s) { return static_cast<double>(s.nodes); });
+}
+
+std::vector<double> Launches::log_evidences() {
+  std::vector<double> all;
+  for (const auto& filter : filters_) all.push_back(filter->posterior().log_evidence);
+  return all;
+}
+
+std::optional<LikelihoodRatio> Launches::average_ratio() {
+  std::vector<double> log_mean, log_variance;
+  LikelihoodRatio average;
+  for (const auto& filter : filters_) {
+    const std::optional<LikelihoodRatio> ratio = filter->likelihood_ratio();
+    if (!ratio) return {};
+    log_mean.push_back(ratio->log_mean);
+    log_variance.push_back(ratio->log_variance);
+    average.effective_size += ratio->effective_size / static_cast<double>(filters_.size());
+  }
+  average.log_mean = log_average(log_mean);
+  average.log_variance = log_average(log_variance);
+  return average;
 }
 
 FilterStatistics Launches::statistics() const {

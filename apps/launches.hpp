@@ -1,6 +1,8 @@
 #pragma once
 /// Independent launches of one filter, side by side, and what they say together.
 #include <memory>
+#include <optional>
+#include <span>
 #include <vector>
 
 #include "filter_arguments.hpp"
@@ -15,7 +17,11 @@ struct LaunchesSummary {
   std::vector<double>
       mean_sd;  ///< per component: standard deviation over the launches of the posterior mean; 0 for M = 1
   double log_evidence_sd = 0;
+  std::optional<LikelihoodRatio> ratio;  ///< of a filter that keeps it: averages of L and of its variance
 };
+
+/// log of the mean of exp(l). @pre not empty
+double log_average(std::span<const double> logarithms);
 
 class Launches {
  public:
@@ -26,10 +32,14 @@ class Launches {
   /// The law of the first launch.
   const Posterior& posterior() { return filters_.front()->posterior(); }
   void summarise(double time, int highest_moment, LaunchesSummary& out);
+  /// Of each launch.
+  std::vector<double> log_evidences();
   /// Work of all launches together.
   FilterStatistics statistics() const;
 
  private:
+  std::optional<LikelihoodRatio> average_ratio();
+
   std::size_t components_;
   std::vector<std::unique_ptr<Filter>> filters_;
   std::vector<PosteriorSummary> summaries_;

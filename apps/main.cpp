@@ -18,6 +18,7 @@ int main(int argc, char** argv) {
       "Each subcommand has its own --help.");
   add_simulate_command(program);
   add_filter_command(program);
+  add_compare_command(program);
   add_formulas_command(program);
   add_model_command(program);
   add_tree_command(program);

@@ -11,6 +11,7 @@
 #include "wienertree/filter/kalman_bucy_filter.hpp"
 #include "wienertree/filter/kalman_filter.hpp"
 #include "wienertree/filter/klv_filter.hpp"
+#include "wienertree/filter/weighted_filter.hpp"
 #include "wienertree/tree/tree_size.hpp"
 
 namespace wienertree {
@@ -78,6 +79,9 @@ std::unique_ptr<Filter> make_filter(const Model& model, const FilterOptions& opt
     case FilterMethod::gaussian_mixture:
       check_mixture_options(options);
       return std::make_unique<GaussianMixtureFilter>(model, options);
+    case FilterMethod::weighted:
+      check_node_options(options);
+      return std::make_unique<WeightedFilter>(model, options);
     case FilterMethod::full_tree: {
       check_tree_options(model, options);
       FilterOptions unpruned = options;

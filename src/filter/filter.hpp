@@ -27,6 +27,17 @@ struct FilterStatistics {
   double discarded = 0;             ///< sum of Selection::discarded over the steps
 };
 
+/// Of a filter that compares the model with noise alone: what its particles' likelihood ratios L say.
+struct LikelihoodRatio {
+  double log_mean = 0;  ///< log of the mean of L: the log Bayes factor of the model against noise
+  double log_variance =
+      0;  ///< log of the empirical variance of L over the particles; -infinity if they are equal
+  double effective_size = 0;
+  /// Below 10 effective particles the mean has a relative standard error above 30 %, and that estimate
+  /// itself, made of so few particles, is too small.
+  bool collapsed() const { return effective_size < 10; }
+};
+
 /// One step each: `advance` takes the next window, `posterior` is the law at its end.
 class Filter {
  public:
@@ -40,13 +51,25 @@ class Filter {
   /// The current generation of nodes and how it came from the one before, for filters that keep nodes, else
   /// nullptr.
   virtual const Generation* generation() const { return nullptr; }
+  /// For filters that keep likelihood ratios, else nothing.
+  virtual std::optional<LikelihoodRatio> likelihood_ratio() { return {}; }
   const FilterStatistics& statistics() const { return statistics_; }
 
  protected:
   FilterStatistics statistics_;
 };
 
-enum class FilterMethod { klv, full_tree, euler, gaussian_mixture, benes, kalman_bucy, kalman, grid };
+enum class FilterMethod {
+  klv,
+  full_tree,
+  euler,
+  gaussian_mixture,
+  weighted,
+  benes,
+  kalman_bucy,
+  kalman,
+  grid
+};
 
 /// Which weights decide where the particles go (Crisan, Ortiz-Latorre 2013, versions 1 and 2).
 enum class PruneWeights {

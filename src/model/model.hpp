@@ -46,6 +46,9 @@ class ObservationDensity {
   /// @throws InputError when the law cannot be sampled (a `log_likelihood` expression)
   virtual void sample(std::span<const double> x, std::span<const double> uniforms,
                       std::span<const double> normals, std::span<double> y) const = 0;
+  /// Log density of y if it were noise alone, y = v. Missing components contribute nothing.
+  /// @throws InputError when the density is not that of h(x) + noise
+  virtual double log_noise_density(std::span<const double> y) const = 0;
   /// Variance of additive Gaussian noise per component (k values) when y = h(x) + N(0, sd^2); empty
   /// otherwise.
   virtual std::vector<double> gaussian_variances() const { return {}; }

@@ -106,6 +106,13 @@ class AdditiveNoise final : public ObservationDensity {
     }
   }
 
+  double log_noise_density(std::span<const double> y) const override {
+    double sum = 0;
+    for (std::size_t i = 0; i < laws_.size(); ++i)
+      if (!std::isnan(y[i])) sum += log_noise(laws_[i], y[i]);
+    return sum;
+  }
+
   void sample(std::span<const double> x, std::span<const double> uniforms, std::span<const double> normals,
               std::span<double> y) const override {
     assert(uniforms.size() == laws_.size() && normals.size() == laws_.size() && y.size() == laws_.size());
@@ -152,6 +159,11 @@ class TapeDensity final : public ObservationDensity {
     log_likelihood_.evaluate(inputs, y, std::span(&output, 1), x.nodes());
   }
 
+  double log_noise_density(std::span<const double>) const override {
+    throw InputError("a density given as an expression has no law of the noise alone: give h and noise",
+                     name_);
+  }
+
   void sample(std::span<const double>, std::span<const double>, std::span<const double>,
               std::span<double>) const override {
     throw InputError("observations cannot be drawn from a density given as an expression", name_);
@@ -163,6 +175,24 @@ class TapeDensity final : public ObservationDensity {
 };
 
 }  // namespace
+
+double log_noise(const NoiseLaw& law, double v) {
+  const double z = v / law.scale;
+  switch (law.kind) {
+    case NoiseLaw::Kind::gaussian:
+      return -0.5 * z * z - std::log(law.scale) - 0.5 * std::log(2.0 * std::numbers::pi);
+    case NoiseLaw::Kind::laplace:
+      return -std::abs(z) - std::log(2.0 * law.scale);
+    case NoiseLaw::Kind::student_t: {
+      const double n = law.dof;
+      return std::lgamma(0.5 * (n + 1.0)) - std::lgamma(0.5 * n) - 0.5 * std::log(n * std::numbers::pi) -
+             std::log(law.scale) - 0.5 * (n + 1.0) * std::log1p(z * z / n);
+    }
+    case NoiseLaw::Kind::log_chi_square:
+      break;
+  }
+  return 0.5 * (v - std::exp(v)) - 0.5 * std::log(2.0 * std::numbers::pi);
+}
 
 std::unique_ptr<ObservationDensity> make_additive_noise(std::shared_ptr<const VectorFields> fields,
                                                         std::vector<NoiseLaw> laws) {

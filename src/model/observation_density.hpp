@@ -21,6 +21,9 @@ struct NoiseLaw {
   double dof = 1;    ///< of student_t
 };
 
+/// log g(v).
+double log_noise(const NoiseLaw& law, double v);
+
 /// y_i = h_i(x) + v_i with independent v_i of the given laws, h the sensor of the fields.
 /// laws: one for every component.
 /// @throws InputError for a scale or dof that is not positive, or a wrong number of laws

@@ -82,7 +82,11 @@ class ChainEvidence {
     if (functional_ == FunctionalMethod::picard) return a * D - s / 2 * a * a;
     const double quadratic = s / 6 * (a * a + a * b + b * b);
     if (functional_ == FunctionalMethod::trapezoid) return (a + b) / 2 * D - quadratic;
-    return a * D + (b - a) * w.integral[0] / s - quadratic + G * G * (w.covariation[0] - s * s / 6) / 2;
+    const double c = w.bridge_start[0] * a + w.bridge_end[0] * b, s2 = s * s, s3 = s2 * s;
+    const double R = s3 / 45 * (a * a + b * b) + 7 * s3 / 180 * a * b;
+    const double theta = 1 / (1 + s2 / (std::numbers::pi * std::numbers::pi) * G * G);
+    const double M = theta * (w.covariation[0] - s2 / 6 - 2 * c + R);
+    return a * D + (b - a) * w.integral[0] / s - quadratic + G * G * M / 2;
   }
 
   void move(const ObservationWindow& w) {
