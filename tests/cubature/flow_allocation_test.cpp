@@ -1,33 +1,9 @@
 // The flows allocate nothing once they are warm.
 #include <catch2/catch.hpp>
 
-#include <cstdlib>
-#include <new>
-
+#include "allocations.hpp"
 #include "cubature/flow_cases.hpp"
 #include "wienertree/cubature/flow.hpp"
-
-namespace {
-std::size_t allocations = 0;
-
-void* counted(std::size_t size, std::size_t alignment) {
-  ++allocations;
-  void* memory = alignment > alignof(std::max_align_t)
-                     ? std::aligned_alloc(alignment, (size + alignment - 1) / alignment * alignment)
-                     : std::malloc(size);
-  if (memory == nullptr) throw std::bad_alloc();
-  return memory;
-}
-}  // namespace
-
-void* operator new(std::size_t size) { return counted(size, 1); }
-void* operator new(std::size_t size, std::align_val_t alignment) {
-  return counted(size, static_cast<std::size_t>(alignment));
-}
-void operator delete(void* memory) noexcept { std::free(memory); }
-void operator delete(void* memory, std::size_t) noexcept { std::free(memory); }
-void operator delete(void* memory, std::align_val_t) noexcept { std::free(memory); }
-void operator delete(void* memory, std::size_t, std::align_val_t) noexcept { std::free(memory); }
 
 using namespace wienertree;
 using namespace wienertree::test;
@@ -43,10 +19,10 @@ TEST_CASE("moving nodes allocates nothing after the first time") {
       std::size_t during[2];
       for (std::size_t& count : during) {
         Batch x = copy(problem.nodes);
-        const std::size_t before = allocations;
+        const std::size_t before = allocations();
         for (const std::vector<double>& D : problem.segments) flow->move(D, x, failures);
         flow->move_along(path, 0.01, x, failures);
-        count = allocations - before;
+        count = allocations() - before;
       }
       CAPTURE(problem.model.name, flow->name());
       CHECK(during[1] == 0);

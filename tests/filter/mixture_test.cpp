@@ -8,7 +8,7 @@
 
 #include "filter/linear_problems.hpp"
 #include "filter/text_problems.hpp"
-#include "model/allocations.hpp"
+#include "allocations.hpp"
 #include "wienertree/filter/expectation.hpp"
 #include "wienertree/model/observation_density.hpp"
 

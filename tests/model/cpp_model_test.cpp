@@ -4,7 +4,7 @@
 #include <limits>
 #include <random>
 
-#include "model/allocations.hpp"
+#include "allocations.hpp"
 #include "model/derivatives.hpp"
 #include "wienertree/model/cpp_model.hpp"
 

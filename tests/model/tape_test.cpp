@@ -3,7 +3,7 @@
 #include <cmath>
 #include <limits>
 
-#include "model/allocations.hpp"
+#include "allocations.hpp"
 #include "model/tape_evaluation.hpp"
 
 using namespace wienertree;

@@ -1,7 +1,7 @@
 // Evaluations of a text model are free of allocation after the first call on a thread.
 #include <catch2/catch.hpp>
 
-#include "model/allocations.hpp"
+#include "allocations.hpp"
 #include "model/text_model_support.hpp"
 
 using namespace wienertree;

@@ -1,35 +1,14 @@
 // Growing a generation, selecting from it, and doing so without allocating.
 #include "wienertree/tree/growth.hpp"
 
-#include <atomic>
 #include <bit>
 #include <catch2/catch.hpp>
 #include <cmath>
-#include <cstdlib>
-#include <new>
 
+#include "allocations.hpp"
 #include "wienertree/model/error.hpp"
 
 using namespace wienertree;
-
-namespace {
-
-std::atomic<std::size_t> allocations{0};
-
-}  // namespace
-
-void* operator new(std::size_t size) {
-  ++allocations;
-  if (void* p = std::malloc(size)) return p;
-  throw std::bad_alloc();
-}
-void* operator new(std::size_t size, const std::nothrow_t&) noexcept {
-  ++allocations;
-  return std::malloc(size);
-}
-void operator delete(void* p) noexcept { std::free(p); }
-void operator delete(void* p, const std::nothrow_t&) noexcept { std::free(p); }
-void operator delete(void* p, std::size_t) noexcept { std::free(p); }
 
 namespace {
 
@@ -231,9 +210,9 @@ TEST_CASE("Growing, thinning and selecting allocate nothing once warm") {
         };
         step();
         step();
-        const std::size_t before = allocations;
+        const std::size_t before = test::allocations();
         step();
-        CHECK(allocations == before);
+        CHECK(test::allocations() == before);
       }
 }
 

@@ -1,22 +1,8 @@
 /// A filter's step does not allocate: thinning reuses its memory.
-#include <atomic>
 #include <catch2/catch.hpp>
-#include <cstdlib>
-#include <new>
 
+#include "allocations.hpp"
 #include "tree/recombination_clouds.hpp"
-
-namespace {
-std::atomic<std::size_t> allocations{0};
-}
-
-void* operator new(std::size_t size) {
-  ++allocations;
-  if (void* p = std::malloc(size)) return p;
-  throw std::bad_alloc();
-}
-void operator delete(void* p) noexcept { std::free(p); }
-void operator delete(void* p, std::size_t) noexcept { std::free(p); }
 
 using namespace wienertree;
 using namespace wienertree::recombination_test;
@@ -29,8 +15,8 @@ TEST_CASE("No allocation after the first call") {
     const auto thinning = make_recombination(0);
     Selection s;
     thinning->thin(c.sites(), 150, {}, s);
-    const std::size_t before = allocations;
+    const std::size_t before = test::allocations();
     thinning->thin(c.sites(), 150, {}, s);
-    REQUIRE(allocations == before);
+    REQUIRE(test::allocations() == before);
   }
 }

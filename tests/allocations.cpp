@@ -1,4 +1,4 @@
-#include "model/allocations.hpp"
+#include "allocations.hpp"
 
 #include <atomic>
 #include <cstddef>
