@@ -12,7 +12,8 @@
 extern "C" {
 #define X(name) __attribute__((const)) WIENERTREE_VECTOR WIENERTREE_LIBMVEC_1(name)(WIENERTREE_VECTOR);
 X(exp)
-X(log) X(sin) X(cos) X(tan) X(sinh) X(cosh) X(tanh) X(atan) X(erf) X(erfc)
+X(log)
+X(sin) X(cos) X(tan) X(sinh) X(cosh) X(tanh) X(atan) X(erf) X(erfc)
 #undef X
     __attribute__((const)) WIENERTREE_VECTOR WIENERTREE_LIBMVEC_2(pow)(WIENERTREE_VECTOR, WIENERTREE_VECTOR);
 }

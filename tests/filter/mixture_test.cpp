@@ -6,9 +6,9 @@
 #include <cmath>
 #include <numbers>
 
+#include "allocations.hpp"
 #include "filter/linear_problems.hpp"
 #include "filter/text_problems.hpp"
-#include "allocations.hpp"
 #include "wienertree/filter/expectation.hpp"
 #include "wienertree/model/observation_density.hpp"
 
