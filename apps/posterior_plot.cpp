@@ -117,7 +117,7 @@ std::string draw_posterior(Picture picture, const std::string& title,
   picture.begin(width, height);
   picture.add(fmt::format("set multiplot\nset label 1 {} at screen 0.5,{:.4f} center noenhanced",
                           quoted(title), 1 - 0.55 * title_height / height));
-  picture.add(fmt::format("set lmargin at screen {:.4f}\nset rmargin at screen {:.4f}", 78.0 / width,
+  picture.add(fmt::format("set lmargin at screen {:.4f}\nset rmargin at screen {:.4f}", 94.0 / width,
                           1 - 136.0 / width));
   const std::vector<double>& time = panels.front().filter.time;
   picture.add(
