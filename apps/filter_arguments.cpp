@@ -26,7 +26,9 @@ const Choices<ThinningMethod> thinnings = {{"none", ThinningMethod::none},
                                            {"residual", ThinningMethod::residual},
                                            {"stratified", ThinningMethod::stratified},
                                            {"systematic", ThinningMethod::systematic},
-                                           {"recombination", ThinningMethod::recombination}};
+                                           {"recombination", ThinningMethod::recombination},
+                                           {"levelwise", ThinningMethod::levelwise},
+                                           {"heavy-first", ThinningMethod::heavy_first}};
 const Choices<SiteOrder> orders = {{"tree", SiteOrder::tree}, {"spatial", SiteOrder::spatial}};
 const Choices<PruneWeights> prunings = {{"likelihood", PruneWeights::likelihood},
                                         {"cubature", PruneWeights::cubature}};
@@ -78,15 +80,18 @@ void refuse_inapplicable(const FilterArguments& a, const Model& model, FilterMet
                          ThinningMethod thin) {
   const std::string with_method = "has no meaning with --method " + name_of(methods, method);
   const std::string with_thinning = "has no meaning with --thin " + name_of(thinnings, thin);
-  refuse_if(a.ess_threshold && method != FilterMethod::euler, "--ess-threshold", with_method);
+  refuse_if(a.ess_threshold && method != FilterMethod::euler && method != FilterMethod::klv,
+            "--ess-threshold", with_method);
+  refuse_if(a.ess_threshold && a.prune_weights == PruneWeights::cubature, "--ess-threshold",
+            "has no meaning with --prune-weights cubature, where likelihoods never decide");
   refuse_if(a.alpha && method != FilterMethod::gaussian_mixture, "--alpha", with_method);
   refuse_if(a.beta && method != FilterMethod::gaussian_mixture, "--beta", with_method);
   refuse_if(a.functional && model.observation != ObservationKind::continuous, "--functional",
             "has meaning only for continuous observations");
   if (moves_particles(method)) {
     refuse_tree_options(a, with_method);
-    refuse_if(a.thin == ThinningMethod::recombination, "--thin",
-              "recombination " + with_method + ", which counts particles");
+    refuse_if(recombines(thin), "--thin",
+              name_of(thinnings, thin) + " " + with_method + ", which counts particles");
     refuse_if(a.thin && method == FilterMethod::weighted, "--thin", with_method + ", which never resamples");
     refuse_if(thin == ThinningMethod::none && method == FilterMethod::gaussian_mixture, "--thin",
               "none " + with_method + ", whose corrections draw offspring");
@@ -104,9 +109,11 @@ void refuse_inapplicable(const FilterArguments& a, const Model& model, FilterMet
   if (method == FilterMethod::full_tree) {
     refuse_thinning_options(a, with_method);
     refuse_if(a.nodes.has_value() && !model.initial_law, "--nodes", with_method + " and a fixed start");
-  } else if (thin == ThinningMethod::recombination) {
+  } else if (recombines(thin)) {
+    refuse_if(a.ess_threshold.has_value(), "--ess-threshold",
+              with_thinning + ", which lets likelihoods decide at every step");
     refuse_if(a.order.has_value(), "--order", with_thinning);
-    refuse_if(a.prune_weights == PruneWeights::cubature, "--thin recombination",
+    refuse_if(a.prune_weights == PruneWeights::cubature, ("--thin " + name_of(thinnings, thin)).c_str(),
               "merges states, and does not go with --prune-weights cubature");
     refuse_random_options(a, with_thinning);
   } else {
@@ -132,7 +139,7 @@ std::size_t default_nodes(FilterMethod method, ThinningMethod thin, std::size_t 
   if (method == FilterMethod::grid) return FilterOptions{}.grid_points;
   if (method == FilterMethod::euler || method == FilterMethod::weighted) return 10000;
   if (method == FilterMethod::gaussian_mixture) return 1000;
-  if (thin == ThinningMethod::recombination) return dimension == 1 ? 60 : dimension == 2 ? 300 : 600;
+  if (recombines(thin)) return dimension == 1 ? 60 : dimension == 2 ? 300 : 600;
   return dimension == 1 ? 1000 : 10000;
 }
 
@@ -179,7 +186,8 @@ void add_filter_options(CLI::App& app, FilterArguments& a) {
   add_choice(app, "--method", a.method, methods, "The filter [klv]");
   add_tree_options(app, a);
   add_number(app, "--ess-threshold", a.ess_threshold, Sign::any,
-             "euler: resample when the effective sample size is at most this part of --nodes [1]");
+             "Random thinning goes by likelihoods when the effective sample size is at most this part "
+             "of all [1]");
   add_number(app, "--alpha", a.alpha, Sign::any,
              "gaussian-mixture: part of the noise that spreads the Gaussians, 0 to 1 [1/sqrt(nodes)]");
   add_number(app, "--beta", a.beta, Sign::any,
@@ -236,8 +244,8 @@ FilterSetup filter_setup(const FilterArguments& a, const Model& model) {
   o.threads =
       static_cast<unsigned>(a.threads.value_or(many ? std::max(1U, std::thread::hardware_concurrency()) : 1));
   setup.launches = static_cast<std::uint32_t>(a.launches.value_or(1));
-  setup.random = moves_particles(o.method) ||
-                 (o.method == FilterMethod::klv && o.thinning.method != ThinningMethod::recombination);
+  setup.random =
+      moves_particles(o.method) || (o.method == FilterMethod::klv && !recombines(o.thinning.method));
   return setup;
 }
 
@@ -260,7 +268,9 @@ Json options_in_force(const FilterSetup& setup, const Model& model) {
     if (o.thinning.recombination_degree > 0) json["recombination-degree"] = o.thinning.recombination_degree;
   }
   if (o.method == FilterMethod::klv) json["prune-weights"] = name_of(prunings, o.prune_weights);
-  if (o.method == FilterMethod::euler) json["ess-threshold"] = o.ess_threshold;
+  const bool likelihoods_decide =
+      o.method == FilterMethod::klv && setup.random && o.prune_weights == PruneWeights::likelihood;
+  if (o.method == FilterMethod::euler || likelihoods_decide) json["ess-threshold"] = o.ess_threshold;
   if (o.method == FilterMethod::gaussian_mixture) {
     json["alpha"] = mixture_alpha(o);
     json["beta"] = o.beta;

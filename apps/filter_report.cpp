@@ -99,6 +99,7 @@ std::string work_line(const FilterContext& c, const FilterRun& run, double secon
     text = fmt::format("  {:g} nodes kept at the end, {} grown, {} ODE solves", run.rows.back().nodes,
                        s.children, s.flow.node_segments);
     if (s.flow.cvode_nodes > 0) text += fmt::format(" ({} by CVODE)", s.flow.cvode_nodes);
+    if (recombines(c.setup.options.thinning.method)) text += fmt::format(", {:.2g} discarded", s.discarded);
     if (s.dropped_nodes > 0) text += fmt::format(", {} nodes dropped", s.dropped_nodes);
     text += ", ";
   } else {
@@ -160,6 +161,7 @@ Json filter_report(const FilterContext& c, const FilterRun& run) {
   report["children"] = run.statistics.children;
   report["ode_solves"] = run.statistics.flow.node_segments;
   report["dropped_nodes"] = run.statistics.dropped_nodes;
+  if (recombines(c.setup.options.thinning.method)) report["discarded"] = run.statistics.discarded;
   if (run.exact.empty()) return report;
   Json exact;
   exact["filter"] = method_name(*exact_method(c.model));

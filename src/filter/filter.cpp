@@ -22,24 +22,31 @@ void check_node_options(const FilterOptions& options) {
   if (options.threads == 0) throw InputError("must be at least 1", "threads", "0");
 }
 
+void check_ess_threshold(const FilterOptions& options) {
+  if (!(options.ess_threshold >= 0 && options.ess_threshold <= 1))
+    throw InputError("must lie between 0 and 1", "ess-threshold", fmt::format("{}", options.ess_threshold));
+}
+
 void check_tree_options(const Model& model, const FilterOptions& options) {
   check_node_options(options);
   check_formula_fits(options.formula, model);
-  if (options.prune_weights == PruneWeights::cubature &&
-      options.thinning.method == ThinningMethod::recombination)
+  if (options.prune_weights == PruneWeights::cubature && recombines(options.thinning.method))
     throw InputError(
         "recombination merges states, and a likelihood carried along belongs to a whole path: thin "
         "cubature weights by a method that counts, tbba for one",
         "prune-weights", "cubature");
+  check_ess_threshold(options);
+  if (options.ess_threshold < 1 && recombines(options.thinning.method))
+    throw InputError("recombination merges states, and a likelihood carried along belongs to a whole path",
+                     "ess-threshold", fmt::format("{}", options.ess_threshold));
   if (!(options.memory_limit > 0))
     throw InputError("must be positive", "memory limit", fmt::format("{}", options.memory_limit));
 }
 
 void check_particle_options(const FilterOptions& options) {
   check_node_options(options);
-  if (!(options.ess_threshold >= 0 && options.ess_threshold <= 1))
-    throw InputError("must lie between 0 and 1", "ess-threshold", fmt::format("{}", options.ess_threshold));
-  if (options.thinning.method == ThinningMethod::recombination)
+  check_ess_threshold(options);
+  if (recombines(options.thinning.method))
     throw InputError("particles need a thinning that counts them; recombination keeps weights", "thin",
                      "recombination");
 }

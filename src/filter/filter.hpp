@@ -87,8 +87,11 @@ struct FilterOptions {
   ThinningOptions thinning;
   PruneWeights prune_weights = PruneWeights::likelihood;
   FunctionalMethod functional = FunctionalMethod::second_order;
-  double ess_threshold =
-      1.0;  ///< Euler: resample when the effective sample size is at most this fraction of N
+  /// Random thinning lets likelihoods decide when their effective sample size is at most this fraction F of
+  /// what it is when all are equal. Euler: particles are resampled then, and not before. Tree: children are
+  /// always thinned to N, before by cubature weights alone, the likelihoods carried; F = 1 lets them decide
+  /// at every step. Either way the evidence stays unbiased.
+  double ess_threshold = 1.0;
   std::optional<double>
       alpha;        ///< Gaussian mixture: part of the noise that spreads the Gaussians; N^{-1/2} if none
   double beta = 0;  ///< Gaussian mixture: offspring have variance alpha beta

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 #include "wienertree/filter/places.hpp"
 #include "wienertree/tree/initial.hpp"
@@ -21,15 +22,19 @@ KlvFilter::KlvFilter(const Model& model, const FilterOptions& options)
       survivors_(first_generation(model_, options_.nodes)),
       current_(&survivors_),
       child_sensor_(options_.threads) {
-  if (options_.prune_weights == PruneWeights::cubature)
-    survivors_.log_likelihood.assign(survivors_.size(), 0.0);
+  if (carries_likelihood()) survivors_.log_likelihood.assign(survivors_.size(), 0.0);
 }
 
 std::string_view KlvFilter::name() const { return thinning_ ? "klv" : "full-tree"; }
 
+// For good, or until their effective sample size asks that they decide.
+bool KlvFilter::carries_likelihood() const {
+  return options_.prune_weights == PruneWeights::cubature || (thinning_ && options_.ess_threshold < 1);
+}
+
 // The part of the weight that observations go to.
 std::vector<double>& KlvFilter::likelihood_of(Generation& g) const {
-  return options_.prune_weights == PruneWeights::cubature ? g.log_likelihood : g.log_weight;
+  return carries_likelihood() ? g.log_likelihood : g.log_weight;
 }
 
 void KlvFilter::advance(const ObservationWindow& window) {
@@ -119,6 +124,7 @@ void KlvFilter::thin(const ObservationWindow& window) {
     copy_generation(children_, survivors_);
     return;
   }
+  let_likelihoods_decide_if_due();
   const Sites sites{children_.states, children_.log_weight, survivors_.size(), &grower_.threads()};
   const RandomStream random{options_.seed, options_.launch, static_cast<std::uint32_t>(window.step),
                             Purpose::thinning};
@@ -129,6 +135,25 @@ void KlvFilter::thin(const ObservationWindow& window) {
   }
   select(children_, selection_, survivors_, &grower_.threads());
   statistics_.discarded += selection_.discarded;
+}
+
+// Effective sample size of likelihoods L under the tree's weights q, relative to that of equal ones:
+// (sum q L)^2 / (sum q sum q L^2).
+void KlvFilter::let_likelihoods_decide_if_due() {
+  if (!carries_likelihood() || options_.prune_weights == PruneWeights::cubature) return;
+  std::vector<double>&q = children_.log_weight, &L = children_.log_likelihood;
+  const double largest_q = *std::max_element(q.begin(), q.end());
+  const double largest_L = *std::max_element(L.begin(), L.end());
+  double mass = 0, sum = 0, squares = 0;
+  for (std::size_t n = 0; n < q.size(); ++n) {
+    const double weight = std::exp(q[n] - largest_q), likelihood = std::exp(L[n] - largest_L);
+    mass += weight;
+    sum += weight * likelihood;
+    squares += weight * likelihood * likelihood;
+  }
+  // Not a number, and nothing but zeros, go on to the thinning, which refuses them.
+  if (sum * sum > options_.ess_threshold * mass * squares) return;
+  for (std::size_t n = 0; n < q.size(); ++n) q[n] += std::exchange(L[n], 0.0);
 }
 
 const Posterior& KlvFilter::posterior() {

@@ -23,7 +23,9 @@ class KlvFilter final : public Filter {
   void grow(const ObservationWindow& window);
   void weigh(const ObservationWindow& window);
   void thin(const ObservationWindow& window);
+  void let_likelihoods_decide_if_due();
   void handle_failures(const ObservationWindow& window);
+  bool carries_likelihood() const;
   std::vector<double>& likelihood_of(Generation& generation) const;
 
   Model model_;

@@ -17,9 +17,9 @@ namespace {
 
 class Recombination final : public Thinning {
  public:
-  explicit Recombination(int degree) : degree_(degree) {}
+  Recombination(int degree, bool patched) : degree_(degree), patched_(patched) {}
   void thin(const Sites& sites, std::size_t budget, const RandomStream& random, Selection& out) override;
-  std::string_view name() const override { return "recombination"; }
+  std::string_view name() const override { return patched_ ? "recombination" : "levelwise"; }
   bool deterministic() const override { return true; }
 
  private:
@@ -32,6 +32,7 @@ class Recombination final : public Thinning {
   void thin_space(const Sites& sites, std::size_t budget, Selection& out);
 
   int degree_;
+  bool patched_;
   std::vector<std::uint32_t> live_;   ///< sites of positive weight, in lexicographic order
   std::vector<std::size_t> varying_;  ///< components
   std::vector<double> log_weight_;    ///< of the live sites
@@ -141,7 +142,12 @@ void Recombination::keep_first(const Sites& sites, Selection& out) const {
 }
 
 void Recombination::thin_line(const Sites& sites, std::size_t budget, Selection& out) {
-  line_.reduce(x_.component(0), log_weight_, degree_, budget, nodes_);
+  // (2s - 1)/2 + 1 = s nodes a patch: one patch if s is the budget.
+  constexpr std::size_t most = std::numeric_limits<int>::max() / 2;
+  const int degree = !patched_ && degree_ == 0 ? static_cast<int>(2 * std::min(budget, most) - 1) : degree_;
+  const std::size_t in_a_patch = static_cast<std::size_t>(degree) / 2 + 1;
+  line_.reduce(x_.component(0), log_weight_, degree, patched_ ? budget : std::min(budget, in_a_patch),
+               nodes_);
   const std::size_t kept = nodes_.x.size();
   out.site.resize(kept);
   out.moved_states.reshape(sites.x.components(), kept);
@@ -158,8 +164,11 @@ void Recombination::thin_space(const Sites&, std::size_t budget, Selection& out)
   // (d + r choose r) > r: a degree beyond the budget is lowered anyhow.
   const auto largest_useful =
       static_cast<int>(std::min<std::size_t>(budget, std::numeric_limits<int>::max()));
-  int degree = degree_ > 0 ? std::min(degree_, largest_useful) : recombination_degree(d, budget);
+  int degree = degree_ > 0 ? std::min(degree_, largest_useful) : 0;
+  if (degree == 0 && patched_) degree = recombination_degree(d, budget);
+  if (degree == 0 && !patched_) degree = largest_useful;
   while (moment_number(d, degree, budget + 1) > budget) --degree;
+  if (!patched_) budget = moment_number(d, degree, budget);
   space_.reduce(x_, log_weight_, degree, budget, kept_);
   out.site.resize(kept_.point.size());
   for (std::size_t j = 0; j < kept_.point.size(); ++j) out.site[j] = live_[kept_.point[j]];
@@ -167,13 +176,22 @@ void Recombination::thin_space(const Sites&, std::size_t budget, Selection& out)
   out.discarded = kept_.discarded;
 }
 
-}  // namespace
-
-std::unique_ptr<Thinning> make_recombination(int degree) {
+void check_degree(int degree) {
   if (degree < 0)
     throw InputError("the degree of recombination must be positive, or 0 to be chosen", "recombination",
                      fmt::format("{}", degree));
-  return std::make_unique<Recombination>(degree);
+}
+
+}  // namespace
+
+std::unique_ptr<Thinning> make_recombination(int degree) {
+  check_degree(degree);
+  return std::make_unique<Recombination>(degree, true);
+}
+
+std::unique_ptr<Thinning> make_levelwise_recombination(int degree) {
+  check_degree(degree);
+  return std::make_unique<Recombination>(degree, false);
 }
 
 std::size_t moment_number(std::size_t dimension, int degree, std::size_t cap) {

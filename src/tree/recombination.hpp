@@ -33,6 +33,10 @@ namespace wienertree {
 /// @throws InputError if degree < 0
 std::unique_ptr<Thinning> make_recombination(int degree);
 
+/// One patch for all sites: the moments of the whole measure, up to the degree that the budget allows (or
+/// `degree`, if that is less; for d = 1 up to degree 2N - 1), and nothing local. Else as make_recombination.
+std::unique_ptr<Thinning> make_levelwise_recombination(int degree);
+
 /// The degree chosen for d >= 2 components that vary: the largest r with at least 2 r patches of q nodes, but
 /// at most 5 (d = 2), 3 (d = 3, 4), 2 (d >= 5), beyond which the reduction costs more than further nodes that
 /// do as much for the error; 1 or, with a budget below 1 + d, 0 if no r has that many patches.

@@ -1,6 +1,7 @@
 #include "wienertree/tree/thinning.hpp"
 
 #include "wienertree/tree/counting.hpp"
+#include "wienertree/tree/heavy_first.hpp"
 #include "wienertree/tree/recombination.hpp"
 
 namespace wienertree {
@@ -11,6 +12,10 @@ std::unique_ptr<Thinning> make_thinning(const ThinningOptions& options) {
       return std::make_unique<KeepAll>(options.order);
     case ThinningMethod::recombination:
       return make_recombination(options.recombination_degree);
+    case ThinningMethod::levelwise:
+      return make_levelwise_recombination(options.recombination_degree);
+    case ThinningMethod::heavy_first:
+      return std::make_unique<HeavyFirst>(options.recombination_degree);
     default:
       return std::make_unique<CountingThinning>(options.method, options.order);
   }

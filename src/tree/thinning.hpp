@@ -12,7 +12,24 @@
 
 namespace wienertree {
 
-enum class ThinningMethod { none, tbba, multinomial, residual, stratified, systematic, recombination };
+enum class ThinningMethod {
+  none,
+  tbba,
+  multinomial,
+  residual,
+  stratified,
+  systematic,
+  recombination,  ///< of patches
+  levelwise,      ///< recombination of the whole generation as one patch
+  heavy_first,    ///< heavy sites stay as they are, the others are recombined
+};
+
+/// Whether a method is deterministic and merges sites instead of counting particles.
+constexpr bool recombines(ThinningMethod method) {
+  return method == ThinningMethod::recombination || method == ThinningMethod::levelwise ||
+         method == ThinningMethod::heavy_first;
+}
+
 /// Order in which the random methods visit the sites: as they lie in the tree, or sorted in space (by x for d
 /// = 1, along a Hilbert curve for d > 1). Spatial order turns an error of N^{-1/2} into about N^{-1} in d
 /// = 1.
@@ -59,7 +76,7 @@ class Thinning {
 struct ThinningOptions {
   ThinningMethod method = ThinningMethod::tbba;
   SiteOrder order = SiteOrder::spatial;
-  int recombination_degree = 0;  ///< moments kept by `recombination`; 0: chosen from d and the budget
+  int recombination_degree = 0;  ///< moments kept where sites are merged; 0: chosen from d and the budget
 };
 
 std::unique_ptr<Thinning> make_thinning(const ThinningOptions& options);

@@ -166,6 +166,22 @@ void check_tree(const Problem& p) {
     }
 }
 
+// One method that counts in tree order and one in spatial order, at every threshold below 1.
+void check_tree_thresholds(const Problem& p) {
+  const CubatureFormula formula = bundled_formula(5, 1);
+  const double truth = log_evidence(p, tree(formula, ThinningMethod::recombination, 400));
+  fmt::print("{}: the tree's {:.6f}\n", p.name, truth);
+  for (const double threshold : {0.7, 0.3})
+    for (const SiteOrder order : {SiteOrder::tree, SiteOrder::spatial}) {
+      FilterOptions o = tree(formula, ThinningMethod::tbba, p.nodes);
+      o.thinning.order = order;
+      o.ess_threshold = threshold;
+      check_unbiased(p, o, truth,
+                     fmt::format("klv, tbba, {} order, likelihoods decide at ESS <= {}",
+                                 order == SiteOrder::tree ? "tree" : "spatial", threshold));
+    }
+}
+
 // Likelihoods that are only carried, or particles never resampled, degenerate: a short record.
 void check_tree_carrying(const Problem& p) {
   const CubatureFormula formula = bundled_formula(5, 1);
@@ -231,6 +247,10 @@ TEST_CASE("the oracle: Euler's chain of a Brownian signal is exact") {
 
 TEST_CASE("klv: evidence is unbiased for the tree's, and that is right to the step's error") {
   for (const Problem& p : {discrete_linear(), continuous_linear(), benes(), nile(30)}) check_tree(p);
+}
+
+TEST_CASE("klv: evidence is unbiased for every threshold of the effective sample size") {
+  for (const Problem& p : {discrete_linear(), continuous_linear(), benes()}) check_tree_thresholds(p);
 }
 
 TEST_CASE("klv: evidence is unbiased where likelihoods are only carried") {
