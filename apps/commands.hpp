@@ -10,5 +10,6 @@ void add_compare_command(CLI::App& program);
 void add_formulas_command(CLI::App& program);
 void add_model_command(CLI::App& program);
 void add_tree_command(CLI::App& program);
+void add_weak_command(CLI::App& program);
 
 }  // namespace wienertree::app

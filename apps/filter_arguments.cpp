@@ -6,6 +6,7 @@
 #include <thread>
 
 #include "formula_choice.hpp"
+#include "tree_choices.hpp"
 #include "wienertree/filter/gaussian_mixture_filter.hpp"
 
 namespace wienertree::app {
@@ -20,25 +21,11 @@ const Choices<FilterMethod> methods = {{"klv", FilterMethod::klv},
                                        {"kalman-bucy", FilterMethod::kalman_bucy},
                                        {"kalman", FilterMethod::kalman},
                                        {"grid", FilterMethod::grid}};
-const Choices<ThinningMethod> thinnings = {{"none", ThinningMethod::none},
-                                           {"tbba", ThinningMethod::tbba},
-                                           {"multinomial", ThinningMethod::multinomial},
-                                           {"residual", ThinningMethod::residual},
-                                           {"stratified", ThinningMethod::stratified},
-                                           {"systematic", ThinningMethod::systematic},
-                                           {"recombination", ThinningMethod::recombination},
-                                           {"levelwise", ThinningMethod::levelwise},
-                                           {"heavy-first", ThinningMethod::heavy_first}};
-const Choices<SiteOrder> orders = {{"tree", SiteOrder::tree}, {"spatial", SiteOrder::spatial}};
 const Choices<PruneWeights> prunings = {{"likelihood", PruneWeights::likelihood},
                                         {"cubature", PruneWeights::cubature}};
 const Choices<FunctionalMethod> functionals = {{"picard", FunctionalMethod::picard},
                                                {"trapezoid", FunctionalMethod::trapezoid},
                                                {"second-order", FunctionalMethod::second_order}};
-const Choices<FlowMethod> flows = {{"auto", FlowMethod::automatic},
-                                   {"exact", FlowMethod::exact},
-                                   {"explicit", FlowMethod::explicit_},
-                                   {"cvode", FlowMethod::cvode}};
 const Choices<OnNodeFailure> failures = {{"stop", OnNodeFailure::stop}, {"drop", OnNodeFailure::drop}};
 
 // Whether a filter moves particles by random numbers.

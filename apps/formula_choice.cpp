@@ -5,9 +5,32 @@
 #include "data_directory.hpp"
 #include "wienertree/cubature/catalogue.hpp"
 #include "wienertree/cubature/formula_file.hpp"
+#include "wienertree/cubature/lie_formula_file.hpp"
 #include "wienertree/model/error.hpp"
 
 namespace wienertree::app {
+namespace {
+
+void require_dimension(int dimension, int p, const std::string& formula) {
+  if (dimension == p) return;
+  throw InputError(
+      fmt::format("is for {} Brownian motion{}, the model has {}", dimension, dimension == 1 ? "" : "s", p),
+      "--formula", formula);
+}
+
+}  // namespace
+
+std::optional<LieFormula> choose_lie_formula(std::optional<std::uint64_t> degree,
+                                             const std::optional<std::string>& formula,
+                                             std::size_t noise_dimension) {
+  if (!formula) return {};
+  const auto file = formula_path(*formula, "--formula");
+  if (!is_lie_formula(file)) return {};
+  if (degree) throw InputError("give --formula or --degree, not both", "--formula", *formula);
+  LieFormula chosen = load_lie_formula(file);
+  require_dimension(chosen.dimension, static_cast<int>(noise_dimension), *formula);
+  return chosen;
+}
 
 CubatureFormula choose_formula(std::optional<std::uint64_t> degree, const std::optional<std::string>& formula,
                                std::size_t noise_dimension) {
@@ -15,10 +38,7 @@ CubatureFormula choose_formula(std::optional<std::uint64_t> degree, const std::o
   if (!formula) return find_formula(static_cast<int>(degree.value_or(5)), p, formulas_directory());
   if (degree) throw InputError("give --formula or --degree, not both", "--formula", *formula);
   CubatureFormula chosen = load_formula(formula_path(*formula, "--formula"));
-  if (chosen.dimension != p)
-    throw InputError(fmt::format("is for {} Brownian motion{}, the model has {}", chosen.dimension,
-                                 chosen.dimension == 1 ? "" : "s", p),
-                     "--formula", *formula);
+  require_dimension(chosen.dimension, p, *formula);
   return chosen;
 }
 

@@ -5,6 +5,7 @@
 #include <string>
 
 #include "wienertree/cubature/formula.hpp"
+#include "wienertree/cubature/lie_formula.hpp"
 
 namespace wienertree::app {
 
@@ -13,5 +14,11 @@ namespace wienertree::app {
 /// @throws InputError if both options are given, or there is no such formula
 CubatureFormula choose_formula(std::optional<std::uint64_t> degree, const std::optional<std::string>& formula,
                                std::size_t noise_dimension);
+
+/// The formula of Lie polynomials in the file of --formula; nothing if the option is not given or names
+/// another kind of formula. @throws InputError as above
+std::optional<LieFormula> choose_lie_formula(std::optional<std::uint64_t> degree,
+                                             const std::optional<std::string>& formula,
+                                             std::size_t noise_dimension);
 
 }  // namespace wienertree::app

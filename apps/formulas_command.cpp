@@ -10,6 +10,7 @@
 #include "wienertree/cubature/catalogue.hpp"
 #include "wienertree/cubature/construct.hpp"
 #include "wienertree/cubature/formula_file.hpp"
+#include "wienertree/cubature/lie_formula_file.hpp"
 
 namespace wienertree::app {
 namespace {
@@ -25,8 +26,26 @@ std::string list_formulas() {
   return text;
 }
 
+std::string show_lie_formula(const std::filesystem::path& file) {
+  const LieFormula formula = read_lie_formula(file);
+  const FormulaVerification verification = verify(formula);
+  require_holds(verification, file.string());
+  std::string text =
+      fmt::format("{}: degree {}, {} Brownian motion{}, {} Lie polynomials\nsource: {}\n{}\n", formula.name,
+                  formula.degree, formula.dimension, formula.dimension == 1 ? "" : "s",
+                  formula.elements.size(), formula.source, verification.brief());
+  for (std::size_t j = 0; j < formula.elements.size(); ++j) {
+    text += fmt::format("\nelement {}, weight {:.17g}\n", j + 1, formula.elements[j].weight);
+    for (const LieTerm& term : formula.elements[j].terms)
+      text += fmt::format(" {:>25.17g} {}\n", term.coefficient, term.bracket.to_string());
+  }
+  return text;
+}
+
 std::string show_formula(const std::string& name) {
-  const CubatureFormula formula = read_formula(formula_path(name, "formulas show"));
+  const std::filesystem::path file = formula_path(name, "formulas show");
+  if (is_lie_formula(file)) return show_lie_formula(file);
+  const CubatureFormula formula = read_formula(file);
   const FormulaVerification verification = verify(formula);
   require_holds(verification, name);
   std::string text =
@@ -47,7 +66,8 @@ std::string show_formula(const std::string& name) {
 
 std::string verify_formula(const std::string& name) {
   const std::filesystem::path file = formula_path(name, "formulas verify");
-  const FormulaVerification verification = verify(read_formula(file));
+  const FormulaVerification verification =
+      is_lie_formula(file) ? verify(read_lie_formula(file)) : verify(read_formula(file));
   require_holds(verification, file.string());
   return fmt::format("{}: {}\n", file.string(), verification.brief());
 }
@@ -55,11 +75,16 @@ std::string verify_formula(const std::string& name) {
 struct ConstructArguments {
   std::optional<std::uint64_t> degree, dimension;
   std::optional<std::string> output;
+  bool lie = false;
 };
 
 void construct_formula(const ConstructArguments& a) {
   OutputFile output("--output", a.output.value_or("-"));
-  output.stage(format_formula(construct(static_cast<int>(*a.degree), static_cast<int>(*a.dimension))));
+  if (a.lie && *a.degree != 5)
+    throw InputError("formulas of Lie polynomials are constructed for degree 5 only", "--degree",
+                     std::to_string(*a.degree));
+  const int degree = static_cast<int>(*a.degree), p = static_cast<int>(*a.dimension);
+  output.stage(a.lie ? format_formula(construct_lie_5(p)) : format_formula(construct(degree, p)));
   output.publish();
 }
 
@@ -92,6 +117,7 @@ void add_formulas_command(CLI::App& program) {
       "construct", "A formula in closed form: degree 3 or 5, any number of Brownian motions");
   add_count(build, "--degree", a->degree, 1, "Degree", 99)->required();
   add_count(build, "--dimension", a->dimension, 1, "Number of Brownian motions", 1000)->required();
+  build.add_flag("--lie", a->lie, "Lie polynomials, for `weak`: fewer ODEs, of fields with Lie brackets");
   add_text(build, "--output", a->output, "FILE", "Where it goes [standard output]");
   build.footer("Example:\n  wienertree formulas construct --degree 5 --dimension 6 --output nv-5-6.json");
   build.callback([a] { construct_formula(*a); });

@@ -19,6 +19,7 @@ int main(int argc, char** argv) {
   add_simulate_command(program);
   add_filter_command(program);
   add_compare_command(program);
+  add_weak_command(program);
   add_formulas_command(program);
   add_model_command(program);
   add_tree_command(program);

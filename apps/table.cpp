@@ -6,6 +6,18 @@
 
 namespace wienertree::app {
 
+namespace {
+
+// RFC 4180: quotes around what holds a comma, a quote or a line's end; quotes inside are doubled.
+std::string quoted_field(const std::string& text) {
+  if (text.find_first_of(",\"\n\r") == std::string::npos) return text;
+  std::string quoted = "\"";
+  for (const char c : text) quoted += c == '"' ? std::string("\"\"") : std::string(1, c);
+  return quoted + '"';
+}
+
+}  // namespace
+
 std::string csv_header(const std::vector<std::string>& columns) {
   return fmt::format("{}\n", fmt::join(columns, ","));
 }
@@ -20,8 +32,14 @@ std::string csv_row(const std::vector<double>& row) {
 }
 
 std::string to_csv(const Table& table) {
-  std::string text = csv_header(table.columns);
-  for (const std::vector<double>& row : table.rows) text += csv_row(row);
+  if (table.label_column.empty()) {
+    std::string text = csv_header(table.columns);
+    for (const std::vector<double>& row : table.rows) text += csv_row(row);
+    return text;
+  }
+  std::string text = table.label_column + ',' + csv_header(table.columns);
+  for (std::size_t r = 0; r < table.rows.size(); ++r)
+    text += quoted_field(table.labels[r]) + ',' + csv_row(table.rows[r]);
   return text;
 }
 
@@ -32,8 +50,10 @@ std::string to_json(const Json& report, const Table& table) {
   text.resize(text.find_last_not_of("\n ") + 1);
   text += report.empty() ? "\n  \"rows\": [" : ",\n  \"rows\": [";
   const char* separator = "\n    ";
-  for (const std::vector<double>& row : table.rows) {
+  for (std::size_t r = 0; r < table.rows.size(); ++r) {
+    const std::vector<double>& row = table.rows[r];
     Json object = Json::object();
+    if (!table.label_column.empty()) object[table.label_column] = table.labels[r];
     for (std::size_t i = 0; i < row.size(); ++i) {
       const bool whole = std::fabs(row[i]) < 1e15 && row[i] == std::floor(row[i]);
       object[table.columns[i]] = whole ? Json(static_cast<std::int64_t>(row[i])) : Json(row[i]);

@@ -11,6 +11,8 @@ using Json = nlohmann::ordered_json;
 struct Table {
   std::vector<std::string> columns;
   std::vector<std::vector<double>> rows;  ///< each as long as `columns`
+  std::string label_column = {};          ///< name of a first column of text; empty: there is none
+  std::vector<std::string> labels = {};   ///< its text, one a row
 };
 
 enum class TableFormat { csv, json };

@@ -17,6 +17,9 @@ namespace wienertree {
 struct CubaturePath {
   double weight = 0;           ///< lambda > 0
   Eigen::MatrixXd increments;  ///< (1+p) x segments
+  /// Row k scales as s^{degree[k]/2} with the length s of a step. Empty: 2 for row 0, 1 for the others, as
+  /// Brownian motion does. Lie brackets that drive a path have degrees of their own.
+  std::vector<int> degree = {};
 };
 
 struct CubatureFormula {
@@ -27,8 +30,8 @@ struct CubatureFormula {
   std::vector<CubaturePath> paths;
 };
 
-/// Increments of segment `segment` for a step of length s: dw^0 -> s dw^0, dw^i -> sqrt(s) dw^i.   out: 1+p
-/// values.
+/// Increments of segment `segment` for a step of length s: dw^0 -> s dw^0, dw^i -> sqrt(s) dw^i, or as the
+/// path's `degree` says.   out: 1+p values.
 void scaled_increments(const CubaturePath& path, std::size_t segment, double s, std::span<double> out);
 
 }  // namespace wienertree

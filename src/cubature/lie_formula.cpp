@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
+#include <map>
 
 #include "wienertree/model/error.hpp"
 
@@ -166,6 +167,52 @@ FormulaVerification verify(const LieFormula& formula, double tolerance, bool loo
   return verify_moments(
       formula.degree, formula.dimension, [&](int degree) { return mean_signature(formula, degree); },
       tolerance, look_beyond);
+}
+
+namespace {
+
+// Letters of a bracket formula: 0 .. p, then brackets in the order in which they are first met.
+class Letters {
+ public:
+  explicit Letters(int p) {
+    for (int i = 0; i <= p; ++i) known_.emplace(fmt::format("{}", i), known_.size());
+    for (int i = 0; i <= p; ++i) degree_.push_back(GradedWords::weight(i));
+  }
+  std::size_t of(const LieBracket& bracket) {
+    const std::string name = bracket.to_string();
+    if (const auto found = known_.find(name); found != known_.end()) return found->second;
+    const std::size_t left = of(bracket.left()), right = of(bracket.right()), letter = degree_.size();
+    brackets_.emplace_back(left, right);
+    degree_.push_back(bracket.degree());
+    known_.emplace(name, letter);
+    return letter;
+  }
+  const std::vector<int>& degree() const { return degree_; }
+  std::vector<std::pair<std::size_t, std::size_t>> brackets() const { return brackets_; }
+
+ private:
+  std::map<std::string, std::size_t> known_;
+  std::vector<int> degree_;
+  std::vector<std::pair<std::size_t, std::size_t>> brackets_;
+};
+
+}  // namespace
+
+BracketFormula bracket_formula(const LieFormula& formula) {
+  check_structure(formula, formula.name);
+  Letters letters(formula.dimension);
+  for (const LieElement& element : formula.elements)
+    for (const LieTerm& term : element.terms) letters.of(term.bracket);
+  BracketFormula result{letters.brackets(), {}};
+  const auto size = static_cast<Eigen::Index>(letters.degree().size());
+  result.formula = {formula.name, formula.degree, static_cast<int>(size) - 1, formula.source, {}};
+  for (const LieElement& element : formula.elements) {
+    CubaturePath path{element.weight, Eigen::MatrixXd::Zero(size, 1), letters.degree()};
+    for (const LieTerm& term : element.terms)
+      path.increments(static_cast<Eigen::Index>(letters.of(term.bracket)), 0) += term.coefficient;
+    result.formula.paths.push_back(std::move(path));
+  }
+  return result;
 }
 
 LieFormula construct_lie_5(const GaussianCubature& rule, double x) {

@@ -11,6 +11,7 @@
 #include <utility>
 #include <vector>
 
+#include "wienertree/cubature/formula.hpp"
 #include "wienertree/cubature/gaussian_cubature.hpp"
 #include "wienertree/cubature/signature.hpp"
 #include "wienertree/cubature/verification.hpp"
@@ -76,6 +77,17 @@ void check_structure(const LieFormula& formula, const std::string& where);
 /// @throws InputError as check_structure and GradedWords
 FormulaVerification verify(const LieFormula& formula, double tolerance = moment_tolerance,
                            bool look_beyond = true);
+
+/// A formula of Lie polynomials as straight lines: along the element sum_b c_b b a node moves for unit time
+/// by the field sum_b c_b s^{g_b/2} V_b, one segment whose letters are 0 .. p and the brackets.
+struct BracketFormula {
+  /// The brackets that are letters p+1, p+2, ..: (i, j) is [V_i, V_j], of letters before it.
+  std::vector<std::pair<std::size_t, std::size_t>> brackets;
+  /// Of dimension p + number of brackets: it drives a model to which the brackets were added as fields. Its
+  /// moments are those of the formula it was made from.
+  CubatureFormula formula;
+};
+BracketFormula bracket_formula(const LieFormula& formula);
 
 /// Degree 5 from a Gaussian rule of degree 5: each point z of weight mu gives two elements of weight mu/2,
 ///

@@ -42,8 +42,17 @@ LieFormula parse_lie_formula(const std::string& text, const std::string& where) 
   return formula;
 }
 
+bool is_lie_formula(const std::filesystem::path& file) {
+  const Json root = json::parse(json::text_of_file(file), file.string());
+  return root.is_object() && root.contains("kind") && root.at("kind") == "lie";
+}
+
+LieFormula read_lie_formula(const std::filesystem::path& file) {
+  return parse_lie_formula(json::text_of_file(file), file.string());
+}
+
 LieFormula load_lie_formula(const std::filesystem::path& file) {
-  LieFormula formula = parse_lie_formula(json::text_of_file(file), file.string());
+  LieFormula formula = read_lie_formula(file);
   require_holds(verify(formula, moment_tolerance, false), file.string());
   return formula;
 }

@@ -18,6 +18,12 @@ namespace wienertree {
 /// @throws InputError naming file, element, term and key
 LieFormula parse_lie_formula(const std::string& text, const std::string& where);
 
+/// Whether the file is JSON with "kind": "lie". @throws InputError if it cannot be read or is not JSON
+bool is_lie_formula(const std::filesystem::path& file);
+
+/// parse_lie_formula on a file. @throws InputError also if the file cannot be read
+LieFormula read_lie_formula(const std::filesystem::path& file);
+
 /// Reads a formula and refuses it unless every moment up to its stated degree holds to moment_tolerance.
 /// @throws InputError as parse_lie_formula, or with the first failing word and both values
 LieFormula load_lie_formula(const std::filesystem::path& file);

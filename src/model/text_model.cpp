@@ -60,21 +60,50 @@ TextModel TextModel::load(const std::string& path, const ParameterOverrides& ove
 
 TextModel TextModel::parse(std::string_view toml, const std::string& origin,
                            const ParameterOverrides& overrides) {
-  auto contents = std::make_shared<Contents>();
-  contents->source = text::read_model(toml, origin);
-  const text::ModelSource& source = contents->source;
-  contents->parameters = text::parameter_values(source, overrides);
+  Contents contents;
+  contents.source = text::read_model(toml, origin);
+  contents.parameters = text::parameter_values(contents.source, overrides);
+  return TextModel(build(std::move(contents)));
+}
+
+// The model from source and parameters.
+std::shared_ptr<TextModel::Contents> TextModel::build(Contents contents) {
+  const text::ModelSource& source = contents.source;
   const text::SymbolicModel symbolic = text::derive(source, false);
   text::Arena arena;
   const text::FieldExpressions bound =
-      text::substitute(symbolic.coefficients, source, contents->parameters, arena);
-  contents->model = text::assemble(source, bound, contents->parameters);
-  const text::ExactFilterAnswer exact = text::exact_filter({bound, source, contents->model});
-  contents->model.exact_filter = exact.filter;
-  contents->model.benes = exact.benes;
-  contents->exact_filter_reason = exact.reason;
-  check(contents->model);
-  return TextModel(std::move(contents));
+      text::substitute(symbolic.coefficients, source, contents.parameters, arena);
+  contents.model = text::assemble(source, bound, contents.parameters);
+  const text::ExactFilterAnswer exact = text::exact_filter({bound, source, contents.model});
+  contents.model.exact_filter = exact.filter;
+  contents.model.benes = exact.benes;
+  contents.exact_filter_reason = exact.reason;
+  check(contents.model);
+  return std::make_shared<Contents>(std::move(contents));
+}
+
+TextModel TextModel::with_integrals(const std::vector<RunningIntegral>& integrals) const {
+  Contents extended;
+  extended.source = contents_->source;
+  extended.parameters = contents_->parameters;
+  extended.source.observation = {};
+  extended.source.exact.reset();
+  for (const RunningIntegral& integral : integrals)
+    text::add_integral(extended.source, integral.name, integral.integrand, integral.where);
+  return TextModel(build(std::move(extended)));
+}
+
+Model TextModel::with_brackets(const std::vector<std::pair<std::size_t, std::size_t>>& brackets) const {
+  text::ModelSource source = contents_->source;
+  source.observation = {};
+  source.exact.reset();
+  const text::SymbolicModel symbolic = text::derive(source, false, brackets);
+  text::Arena arena;
+  const text::FieldExpressions bound =
+      text::substitute(symbolic.coefficients, source, contents_->parameters, arena);
+  Model model = text::assemble(source, bound, contents_->parameters);
+  check(model);
+  return model;
 }
 
 const Model& TextModel::model() const { return contents_->model; }
@@ -123,6 +152,15 @@ BatchFunction TextModel::compile(std::string_view expression, const std::string&
     double* const outputs = out.data();
     tape.evaluate(inputs, {}, std::span(&outputs, 1), x.nodes());
   };
+}
+
+std::optional<double> TextModel::constant(std::string_view expression, const std::string& where) const {
+  const text::SourceExpression source{std::string(expression), {where, 1, 1, ""}, true};
+  text::Arena arena;
+  const text::Expression e = text::state_expression(source, contents_->source, contents_->model.has_clock,
+                                                    contents_->parameters, arena);
+  if (!e->is_number()) return {};
+  return e->number;
 }
 
 Model load_model(const std::string& path, const ParameterOverrides& overrides) {

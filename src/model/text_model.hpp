@@ -6,6 +6,7 @@
 /// tighter than a sign: -x^2 = -(x^2). The drift is given in the Ito or the Stratonovich sense, and the other
 /// one derived.
 #include <memory>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -45,6 +46,12 @@ struct ModelAnalysis {
   std::string exact_filter_reason;  ///< why it applies, or why none does
 };
 
+/// int_0^t of an expression of states, parameters and time along the path, under a name of its own.
+struct RunningIntegral {
+  std::string name, integrand;
+  std::string where;  ///< how errors call it, e.g. "--average"
+};
+
 /// A model together with the text it was made from.
 class TextModel {
  public:
@@ -61,9 +68,22 @@ class TextModel {
   /// @throws InputError with the column of the offending symbol
   BatchFunction compile(std::string_view expression, const std::string& where) const;
 
+  /// The value of an expression in which no state occurs, nor t; nothing if one does. Otherwise as `compile`.
+  std::optional<double> constant(std::string_view expression, const std::string& where) const;
+
+  /// The signal of this model with the integrals as further states after its own: d name = integrand dt,
+  /// starting from 0. An integrand may use the integrals before it. What is observed is left out.
+  /// @throws InputError if a name is no identifier or taken, or an integrand is not an expression
+  TextModel with_integrals(const std::vector<RunningIntegral>& integrals) const;
+  /// The signal with Lie brackets as further driving fields V_{p+1}, V_{p+2}, ..: bracket (i, j) is
+  /// [V_i, V_j] = (DV_j) V_i - (DV_i) V_j, of V_0 .. V_p or of brackets before it. Only its flows mean
+  /// anything (`direct`, `jacobian`, `exact_flow`): a bracket drives no Brownian motion.
+  Model with_brackets(const std::vector<std::pair<std::size_t, std::size_t>>& brackets) const;
+
  private:
   struct Contents;
   explicit TextModel(std::shared_ptr<const Contents> contents) : contents_(std::move(contents)) {}
+  static std::shared_ptr<Contents> build(Contents contents);
   std::shared_ptr<const Contents> contents_;
 };
 

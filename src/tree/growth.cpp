@@ -77,12 +77,87 @@ void copy_states(const Batch& from, Batch& to) {
 
 }  // namespace
 
-void grow(const Generation& parents, const CubatureFormula& formula, double s,
-          std::span<const std::unique_ptr<Flow>> flows, ThreadPool& threads, Generation& children,
-          std::vector<NodeFailure>& failures) {
+namespace {
+
+void require_flows(std::span<const std::unique_ptr<Flow>> flows, const ThreadPool& threads) {
   if (flows.size() < threads.size())
     throw InputError(fmt::format("{} threads need as many flows", threads.size()), "tree",
                      fmt::format("{}", flows.size()));
+}
+
+void sort_by_node(std::vector<NodeFailure>& failures) {
+  std::sort(failures.begin(), failures.end(),
+            [](const NodeFailure& a, const NodeFailure& b) { return a.node < b.node; });
+}
+
+// A run of children along one branch.
+struct Run {
+  std::size_t branch, first, count;
+};
+
+// The chosen children, branch by branch: their parents, weights and counts, and the runs to be moved.
+std::vector<Run> plant_chosen(const Generation& parents, std::size_t branches, double s,
+                              const Selection& chosen, Generation& children) {
+  const std::size_t nodes = parents.size(), total = chosen.site.size();
+  std::vector<std::size_t> end(branches + 1, 0);
+  for (const std::uint32_t site : chosen.site) {
+    if (site >= branches * nodes)
+      throw InputError(fmt::format("a selected site is not one of {} children", branches * nodes),
+                       "selection", fmt::format("{}", site));
+    ++end[site / nodes + 1];
+  }
+  for (std::size_t j = 0; j < branches; ++j) end[j + 1] += end[j];
+  std::vector<Run> runs;
+  for (std::size_t j = 0; j < branches; ++j)
+    for (std::size_t first = end[j]; first < end[j + 1]; first += nodes_a_task)
+      runs.push_back({j, first, std::min(nodes_a_task, end[j + 1] - first)});
+  children.time = parents.time + s;
+  children.states.reshape(parents.states.components(), total);
+  children.log_weight.resize(total);
+  children.log_likelihood.resize(parents.log_likelihood.empty() ? 0 : total);
+  children.parent.resize(total);
+  children.branch.resize(total);
+  children.count.resize(chosen.count.size());
+  std::vector<std::size_t>& place = end;  // of the next child of each branch
+  for (std::size_t k = 0; k < total; ++k) {
+    const std::size_t branch = chosen.site[k] / nodes, parent = chosen.site[k] % nodes, at = place[branch]++;
+    children.log_weight[at] = chosen.log_weight[k];
+    children.parent[at] = static_cast<std::uint32_t>(parent);
+    children.branch[at] = static_cast<std::uint16_t>(branch);
+    if (!chosen.count.empty()) children.count[at] = chosen.count[k];
+    if (!parents.log_likelihood.empty()) children.log_likelihood[at] = parents.log_likelihood[parent];
+    for (std::size_t i = 0; i < parents.states.components(); ++i)
+      children.states(i, at) = parents.states(i, parent);
+  }
+  return runs;
+}
+
+}  // namespace
+
+void grow_chosen(const Generation& parents, const CubatureFormula& formula, double s, const Selection& chosen,
+                 std::span<const std::unique_ptr<Flow>> flows, ThreadPool& threads, Generation& children,
+                 std::vector<NodeFailure>& failures) {
+  require_flows(flows, threads);
+  const std::vector<Run> runs = plant_chosen(parents, formula.paths.size(), s, chosen, children);
+  failures.clear();
+  std::mutex failures_mutex;
+  threads.for_each(runs.size(), [&](std::size_t task, std::size_t thread) {
+    const Run& run = runs[task];
+    std::vector<NodeFailure> failed;
+    flows[thread]->move_along(formula.paths[run.branch], s,
+                              children.states.view().nodes(run.first, run.count), failed);
+    if (failed.empty()) return;
+    for (NodeFailure& f : failed) f.node += run.first;
+    const std::lock_guard lock(failures_mutex);
+    failures.insert(failures.end(), failed.begin(), failed.end());
+  });
+  sort_by_node(failures);
+}
+
+void grow(const Generation& parents, const CubatureFormula& formula, double s,
+          std::span<const std::unique_ptr<Flow>> flows, ThreadPool& threads, Generation& children,
+          std::vector<NodeFailure>& failures) {
+  require_flows(flows, threads);
   shape_children(parents, formula, s, children);
   failures.clear();
   const std::size_t nodes = parents.size(), tasks_a_branch = (nodes + nodes_a_task - 1) / nodes_a_task;
@@ -99,8 +174,7 @@ void grow(const Generation& parents, const CubatureFormula& formula, double s,
     const std::lock_guard lock(failures_mutex);
     failures.insert(failures.end(), failed.begin(), failed.end());
   });
-  std::sort(failures.begin(), failures.end(),
-            [](const NodeFailure& a, const NodeFailure& b) { return a.node < b.node; });
+  sort_by_node(failures);
 }
 
 TreeGrower::TreeGrower(const Model& model, FlowMethod method, FlowTolerance tolerance,

@@ -26,6 +26,13 @@ void grow(const Generation& parents, const CubatureFormula& formula, double s,
           std::span<const std::unique_ptr<Flow>> flows, ThreadPool& threads, Generation& children,
           std::vector<NodeFailure>& failures);
 
+/// Only the children named by `chosen` (indices as above, in any order, each once), with the log-weights and
+/// counts of the selection: a thinning that does not look at states spares the others their ODEs. Children
+/// come branch by branch, in the order of the selection within a branch. Otherwise as `grow`.
+void grow_chosen(const Generation& parents, const CubatureFormula& formula, double s, const Selection& chosen,
+                 std::span<const std::unique_ptr<Flow>> flows, ThreadPool& threads, Generation& children,
+                 std::vector<NodeFailure>& failures);
+
 /// A formula with the flows and threads to apply it.
 class TreeGrower {
  public:
@@ -38,6 +45,10 @@ class TreeGrower {
 
   void grow(const Generation& parents, double s, Generation& children, std::vector<NodeFailure>& failures) {
     wienertree::grow(parents, formula_, s, flows_, threads_, children, failures);
+  }
+  void grow_chosen(const Generation& parents, double s, const Selection& chosen, Generation& children,
+                   std::vector<NodeFailure>& failures) {
+    wienertree::grow_chosen(parents, formula_, s, chosen, flows_, threads_, children, failures);
   }
   const CubatureFormula& formula() const { return formula_; }
   ThreadPool& threads() { return threads_; }

@@ -22,8 +22,10 @@ std::string_view reason(FailureReason r) {
 
 }  // namespace
 
-UnprunedSize unpruned_size(const CubatureFormula& formula, const Model& model, std::size_t steps) {
-  const double leaves = std::pow(static_cast<double>(formula.paths.size()), static_cast<double>(steps));
+UnprunedSize unpruned_size(const CubatureFormula& formula, const Model& model, std::size_t steps,
+                           std::size_t roots) {
+  const double leaves = static_cast<double>(roots) *
+                        std::pow(static_cast<double>(formula.paths.size()), static_cast<double>(steps));
   const auto d = static_cast<double>(model.state_dimension()),
              k = static_cast<double>(model.fields->sensor_dimension());
   // Two generations of states, weight, likelihood, parent and branch; normalised weights and sensor values of
@@ -33,14 +35,25 @@ UnprunedSize unpruned_size(const CubatureFormula& formula, const Model& model, s
 }
 
 void refuse_oversized_tree(const CubatureFormula& formula, const Model& model, std::size_t steps,
-                           double memory_limit) {
-  const UnprunedSize size = unpruned_size(formula, model, steps);
+                           double memory_limit, std::size_t roots) {
+  const UnprunedSize size = unpruned_size(formula, model, steps, roots);
   if (size.bytes <= memory_limit) return;
   throw InputError(
       fmt::format("the unpruned tree of {} steps has {}^{} = {:.3g} leaves and needs about {:.3g} GB, over "
                   "the limit of "
                   "{:.3g} GB: thin it (--thin recombination --nodes N) or take fewer steps (--steps)",
                   steps, formula.paths.size(), steps, size.leaves, size.bytes / 1e9, memory_limit / 1e9),
+      "tree");
+}
+
+void refuse_oversized_step(const CubatureFormula& formula, const Model& model, std::size_t nodes,
+                           double memory_limit) {
+  const double bytes = unpruned_size(formula, model, 1, nodes).bytes;
+  if (bytes <= memory_limit) return;
+  throw InputError(
+      fmt::format("a step from {} nodes along {} paths needs about {:.3g} GB, over the limit of {:.3g} GB: "
+                  "keep fewer nodes (--nodes)",
+                  nodes, formula.paths.size(), bytes / 1e9, memory_limit / 1e9),
       "tree");
 }
 

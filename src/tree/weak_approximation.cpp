@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <cmath>
+#include <utility>
 
 #include "wienertree/tree/growth.hpp"
 #include "wienertree/tree/tree_size.hpp"
@@ -24,6 +25,104 @@ double average(const BatchFunction& payoff, const Generation& leaves, std::vecto
   return sum + lost;
 }
 
+class WeakTree {
+ public:
+  WeakTree(const Model& model, const WeakOptions& options)
+      : model_(model),
+        options_(options),
+        pruned_(options.thinning.method != ThinningMethod::none),
+        by_weight_alone_(pruned_ && options.thinning.order == SiteOrder::tree &&
+                         options.thinning.method != ThinningMethod::recombination),
+        thinning_(pruned_ ? make_thinning(options.thinning) : nullptr),
+        grower_(model, options.flow, options.tolerance, options.formula, options.threads) {
+    for (const CubaturePath& path : options.formula.paths) log_lambda_.push_back(std::log(path.weight));
+  }
+
+  void grow(const Generation& start) {
+    const std::size_t steps = options_.grid.size() - 1;
+    copy_generation(start, nodes_);
+    for (std::size_t j = 1; j <= steps; ++j) {
+      const RandomStream random{options_.seed, options_.launch, static_cast<std::uint32_t>(j),
+                                Purpose::path_sampling};
+      const bool keeps_all = !pruned_ || nodes_.size() * options_.formula.paths.size() <= options_.nodes;
+      if (by_weight_alone_ && !keeps_all)
+        step_by_weight(j, random);
+      else
+        step(j, random, keeps_all || j == steps);
+      if (options_.observe) options_.observe(j);
+    }
+  }
+
+  WeakEstimate average_over_leaves(const std::vector<BatchFunction>& payoffs) const {
+    WeakEstimate estimate;
+    estimate.leaves = nodes_.size();
+    estimate.ode_solves = grower_.statistics().node_segments;
+    estimate.discarded = discarded_;
+    std::vector<double> values;
+    for (const BatchFunction& payoff : payoffs) {
+      estimate.value.push_back(average(payoff, nodes_, values));
+      if (!std::isfinite(estimate.value.back()))
+        throw RunError(
+            fmt::format("the average of payoff {} over the leaves is not finite", estimate.value.size()),
+            "payoff", fmt::format("{}", estimate.value.back()));
+    }
+    return estimate;
+  }
+
+ private:
+  double length(std::size_t j) const { return options_.grid[j] - options_.grid[j - 1]; }
+
+  void discount(Generation& nodes) const {
+    if (!options_.discount_state) return;
+    const auto x = nodes.states.component(*options_.discount_state);
+    for (std::size_t n = 0; n < nodes.size(); ++n) nodes.log_weight[n] -= std::exchange(x[n], 0.0);
+  }
+
+  void require_success(std::size_t j) const {
+    if (!failures_.empty())
+      throw_node_failure(failures_, model_, fmt::format("step {}, t = {:g}", j, options_.grid[j]));
+  }
+
+  void step(std::size_t j, const RandomStream& random, bool keep_all) {
+    grower_.grow(nodes_, length(j), children_, failures_);
+    require_success(j);
+    discount(children_);
+    if (keep_all) {
+      std::swap(nodes_, children_);
+      return;
+    }
+    thinning_->thin({children_.states, children_.log_weight, nodes_.size()}, options_.nodes, random,
+                    selection_);
+    select(children_, selection_, nodes_);
+    discarded_ += selection_.discarded;
+  }
+
+  void step_by_weight(std::size_t j, const RandomStream& random) {
+    const std::size_t parents = nodes_.size(), sites = parents * log_lambda_.size();
+    site_weight_.resize(sites);
+    for (std::size_t branch = 0; branch < log_lambda_.size(); ++branch)
+      for (std::size_t i = 0; i < parents; ++i)
+        site_weight_[branch * parents + i] = nodes_.log_weight[i] + log_lambda_[branch];
+    const ConstBatchView no_states(nullptr, 0, sites, sites);
+    thinning_->thin({no_states, site_weight_, parents}, options_.nodes, random, selection_);
+    grower_.grow_chosen(nodes_, length(j), selection_, children_, failures_);
+    require_success(j);
+    discount(children_);
+    std::swap(nodes_, children_);
+  }
+
+  const Model& model_;
+  const WeakOptions& options_;
+  bool pruned_, by_weight_alone_;
+  std::unique_ptr<Thinning> thinning_;
+  TreeGrower grower_;
+  std::vector<double> log_lambda_, site_weight_;
+  Generation nodes_, children_;
+  Selection selection_;
+  std::vector<NodeFailure> failures_;
+  double discarded_ = 0;
+};
+
 }  // namespace
 
 WeakEstimate weak_approximation(const Model& model, const Generation& start,
@@ -32,37 +131,18 @@ WeakEstimate weak_approximation(const Model& model, const Generation& start,
   check_formula_fits(options.formula, model);
   if (options.grid.size() < 2)
     throw InputError("needs at least one step", "grid", std::to_string(options.grid.size()));
+  if (options.discount_state && *options.discount_state >= model.state_dimension())
+    throw InputError(fmt::format("is not one of {} states", model.state_dimension()), "discount_state",
+                     std::to_string(*options.discount_state));
   if (options.nodes == 0) throw InputError("must be at least 1", "nodes", "0");
-  const std::size_t steps = options.grid.size() - 1;
-  const bool pruned = options.thinning.method != ThinningMethod::none;
-  if (!pruned) refuse_oversized_tree(options.formula, model, steps, options.memory_limit);
-  const auto thinning = pruned ? make_thinning(options.thinning) : nullptr;
-  TreeGrower grower(model, options.flow, options.tolerance, options.formula, options.threads);
-
-  WeakEstimate estimate;
-  Generation nodes, children;
-  Selection selection;
-  std::vector<NodeFailure> failures;
-  copy_generation(start, nodes);
-  for (std::size_t j = 1; j <= steps; ++j) {
-    grower.grow(nodes, options.grid[j] - options.grid[j - 1], children, failures);
-    if (!failures.empty())
-      throw_node_failure(failures, model, fmt::format("step {}, t = {:g}", j, options.grid[j]));
-    if (j == steps || !pruned || children.size() <= options.nodes) {
-      std::swap(nodes, children);  // the leaves are averaged over before anything is thinned away
-      continue;
-    }
-    const RandomStream random{options.seed, options.launch, static_cast<std::uint32_t>(j),
-                              Purpose::path_sampling};
-    thinning->thin({children.states, children.log_weight, nodes.size()}, options.nodes, random, selection);
-    select(children, selection, nodes);
-    estimate.discarded += selection.discarded;
-  }
-  estimate.leaves = nodes.size();
-  estimate.ode_solves = grower.statistics().node_segments;
-  std::vector<double> values;
-  for (const BatchFunction& payoff : payoffs) estimate.value.push_back(average(payoff, nodes, values));
-  return estimate;
+  if (options.thinning.method == ThinningMethod::none)
+    refuse_oversized_tree(options.formula, model, options.grid.size() - 1, options.memory_limit,
+                          start.size());
+  else
+    refuse_oversized_step(options.formula, model, options.nodes, options.memory_limit);
+  WeakTree tree(model, options);
+  tree.grow(start);
+  return tree.average_over_leaves(payoffs);
 }
 
 }  // namespace wienertree

@@ -1,8 +1,11 @@
 #pragma once
 /// E[f(X_T)] by the iterated KLV operator: the tree of a cubature formula grown along a time grid, thinned or
 /// not, and the payoffs averaged over its leaves (Kusuoka 2001; Lyons, Victoir 2004; Litterer, Lyons 2012 for
-/// the thinned tree; Ninomiya 2003 for the tree sampled by TBBA).
+/// the thinned tree; Ninomiya 2003, "A partial sampling method applied to the Kusuoka approximation", for the
+/// tree sampled by TBBA).
 #include <cstdint>
+#include <functional>
+#include <optional>
 #include <vector>
 
 #include "wienertree/cubature/flow.hpp"
@@ -18,14 +21,20 @@ namespace wienertree {
 struct WeakOptions {
   CubatureFormula formula;   ///< dimension p of the model
   std::vector<double> grid;  ///< from time_grid
-  std::size_t nodes = 1000;  ///< N, the budget of the thinning
+  std::size_t nodes = 1000;  ///< N, the budget of the thinning; `none` has no use for it
   ThinningOptions thinning = {ThinningMethod::recombination, SiteOrder::spatial, 0};
   FlowMethod flow = FlowMethod::automatic;
   FlowTolerance tolerance;
   std::uint64_t seed = 1;
   std::uint32_t launch = 0;
   unsigned threads = 1;
-  double memory_limit = 4.0e9;  ///< bytes; an unpruned tree over it is refused before it starts
+  /// A component that is int r dt along the path: values are those of exp(-int_0^T r dt) f(X_T). After each
+  /// step exp(-x) becomes part of the node's weight and x starts again from 0, so that thinning sees the
+  /// discounted measure (Feynman-Kac) and no further dimension.
+  std::optional<std::size_t> discount_state = {};
+  double memory_limit = 4.0e9;  ///< bytes; a tree over it is refused before it starts
+  /// Called after each step with its number, from 1; may be empty.
+  std::function<void(std::size_t step)> observe = {};
 };
 
 struct WeakEstimate {
@@ -35,11 +44,16 @@ struct WeakEstimate {
   double discarded = 0;          ///< sum over the steps of Selection::discarded
 };
 
-/// One tree, many payoffs. The law of the start is that of the model; `start` below is its first generation.
+/// One tree, many payoffs. The law of the start is that of the model; `start` is its first generation.
+///
+/// While a step has at most N children they are all kept. Beyond that, a random thinning in tree order looks
+/// at weights alone: it chooses among the children before any is moved, so that a step costs N moves. All
+/// others look at states: a step costs N c moves, c the paths of the formula, and the children of the last
+/// step are averaged over as they are.
 /// @param payoffs functions of the d states, each with one value a node
-/// @throws InputError if an option does not fit the model, or the unpruned tree exceeds the memory limit,
-/// with its size and the options that avoid it; RunError naming step, time, node and state when a node cannot
-/// be moved
+/// @throws InputError if an option does not fit the model, or the tree exceeds the memory limit, with its
+/// size and the options that avoid it; RunError naming step, time, node and state when a node cannot be
+/// moved, and naming the payoff when its average is not finite
 WeakEstimate weak_approximation(const Model& model, const Generation& start,
                                 const std::vector<BatchFunction>& payoffs, const WeakOptions& options);
 

@@ -117,7 +117,7 @@ TEST_CASE("every subcommand has help with an example, and --help works everywher
   CHECK_THAT(output_of(place, "--version"), Catch::StartsWith("wienertree "));
   for (const char* command :
        {"", "simulate", "filter", "formulas", "formulas list", "formulas show", "formulas verify",
-        "formulas construct", "model", "model list", "model show", "tree"}) {
+        "formulas construct", "model", "model list", "model show", "tree", "weak"}) {
     const std::string help = output_of(place, std::string(command) + " --help");
     INFO(command);
     CHECK_THAT(help, Catch::Contains("xample") && Catch::Contains("  wienertree "));

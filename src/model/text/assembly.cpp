@@ -115,7 +115,7 @@ class Assembly {
       model_.fields->direct(x, D, V);
       D[k] = 0;
       for (std::size_t i = 0; i < source_.states.size(); ++i)
-        require_finite(V(i, 0), k == 0 ? source_.drift[i] : source_.diffusion[i][k - 1]);
+        require_finite(V(i, 0), source_.coefficient(k, i));
     }
     model_.fields->ito_drift(x, V);
     for (std::size_t i = 0; i < source_.states.size(); ++i) require_finite(V(i, 0), source_.drift[i]);

@@ -39,10 +39,12 @@ class Derivation {
         symbols_(symbols_of(source)),
         scope_{symbols_, source.parameters.size(), true, false} {}
 
-  SymbolicModel operator()(bool with_brackets) {
+  SymbolicModel operator()(bool with_brackets,
+                           const std::vector<std::pair<std::size_t, std::size_t>>& further) {
     read();
     add_clock();
     derive_fields();
+    for (const auto& [i, j] : further) add_field(i, j);
     result_.coefficients.d = d_;
     result_.coefficients.p = p_;
     convert_fields();
@@ -81,10 +83,7 @@ class Derivation {
     ++d_;
   }
 
-  const SourceExpression& source_of(std::size_t k, std::size_t i) const {
-    const std::size_t last = std::min(i, source_.states.size() - 1);
-    return k == 0 ? source_.drift[last] : source_.diffusion[last][k - 1];
-  }
+  const SourceExpression& source_of(std::size_t k, std::size_t i) const { return source_.coefficient(k, i); }
 
   ex derivative(const ex& e, std::size_t l) const { return e.diff(symbols_.state(l)); }
 
@@ -165,17 +164,30 @@ class Derivation {
                          place.location.text(), entry.name);
   }
 
+  exvector bracket_of(std::size_t i, std::size_t j) {
+    exvector components(d_);
+    for (std::size_t m = 0; m < d_; ++m)
+      components[m] = at_place(source_of(j, m), [&] {
+        ex component = 0;
+        for (std::size_t l = 0; l < d_; ++l)
+          component += V_[i][l] * derivative(V_[j][m], l) - V_[j][l] * derivative(V_[i][m], l);
+        return simpler(component);
+      });
+    return components;
+  }
+
+  void add_field(std::size_t i, std::size_t j) {
+    V_.push_back(bracket_of(i, j));
+    ++p_;
+  }
+
   void derive_brackets() {
     for (std::size_t i = 0; i <= p_; ++i)
       for (std::size_t j = i + 1; j <= p_; ++j) {
         Bracket bracket{i, j, {}};
-        for (std::size_t m = 0; m < d_; ++m) {
-          ex component = 0;
-          for (std::size_t l = 0; l < d_; ++l)
-            component += V_[i][l] * derivative(V_[j][m], l) - V_[j][l] * derivative(V_[i][m], l);
-          const SourceExpression& place = source_of(j, m);
-          bracket.components.push_back(converted(at_place(place, [&] { return simpler(component); }), place));
-        }
+        const exvector components = bracket_of(i, j);
+        for (std::size_t m = 0; m < d_; ++m)
+          bracket.components.push_back(converted(components[m], source_of(j, m)));
         result_.brackets.push_back(std::move(bracket));
       }
   }
@@ -199,9 +211,10 @@ class Derivation {
 
 }  // namespace
 
-SymbolicModel derive(const ModelSource& source, bool with_brackets) {
+SymbolicModel derive(const ModelSource& source, bool with_brackets,
+                     const std::vector<std::pair<std::size_t, std::size_t>>& further) {
   const std::lock_guard lock(symbolic_mutex());
-  return Derivation(source)(with_brackets);
+  return Derivation(source)(with_brackets, further);
 }
 
 }  // namespace wienertree::text

@@ -29,15 +29,11 @@ FieldExpressions substitute(const FieldExpressions& coefficients, const ModelSou
     for (std::size_t i = 0; i < list.size(); ++i)
       list[i] = substitute(list[i], parameters, arena, place_of(i).location.text());
   };
-  const std::size_t d = coefficients.d, last = source.states.size() - 1;
-  const auto drift_place = [&](std::size_t i) -> const SourceExpression& {
-    return source.drift[std::min(i, last)];
-  };
-  substitute_all(result.ito_drift, drift_place);
+  const std::size_t d = coefficients.d;
+  substitute_all(result.ito_drift,
+                 [&](std::size_t i) -> const SourceExpression& { return source.coefficient(0, i); });
   for (std::size_t k = 0; k <= coefficients.p; ++k) {
-    const auto place = [&](std::size_t i) -> const SourceExpression& {
-      return k == 0 ? drift_place(i) : source.diffusion[std::min(i, last)][k - 1];
-    };
+    const auto place = [&](std::size_t i) -> const SourceExpression& { return source.coefficient(k, i); };
     substitute_all(result.fields[k], place);
     substitute_all(result.jacobians[k],
                    [&](std::size_t i) -> const SourceExpression& { return place(i / d); });

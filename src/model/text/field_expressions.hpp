@@ -5,6 +5,7 @@
 ///     (V_r h_i) = sum_l V_r^l dh_i/dx_l,                   [V, W]^i = sum_l V^l dW^i/dx_l - W^l dV^i/dx_l
 #include <memory>
 #include <optional>
+#include <utility>
 #include <vector>
 
 #include "wienertree/model/text/expression.hpp"
@@ -39,8 +40,11 @@ struct SymbolicModel {
   std::vector<Bracket> brackets;  ///< i < j, when asked for
 };
 
+/// `further` fields are brackets of pairs, V_{p+1} = [V_i, V_j] with (i, j) = further[0] and so on, of V_0
+/// .. V_p or further fields before it; `coefficients.p` counts them.
 /// @throws InputError naming the place in the source
-SymbolicModel derive(const ModelSource& source, bool with_brackets);
+SymbolicModel derive(const ModelSource& source, bool with_brackets,
+                     const std::vector<std::pair<std::size_t, std::size_t>>& further = {});
 
 /// The coefficients with the parameters replaced by their values.
 /// @throws InputError naming the place of a coefficient that is constant and not finite

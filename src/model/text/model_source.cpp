@@ -201,6 +201,29 @@ ModelSource read(const toml::table& table, const TomlFile& file) {
 
 }  // namespace
 
+void add_integral(ModelSource& source, const std::string& name, const std::string& integrand,
+                  const std::string& where) {
+  const Location place{where, 0, 0, ""};
+  check_name(name, place);
+  const auto has_name = [&](const auto& named) { return named.name == name; };
+  if (std::any_of(source.states.begin(), source.states.end(), has_name) ||
+      std::any_of(source.parameters.begin(), source.parameters.end(), has_name))
+    throw InputError("this name is already that of a state or a parameter", place.text(), name);
+  const SourceExpression zero{"0", place, false};
+  StateSource state;
+  state.name = name;
+  state.location = place;
+  state.initial = zero;
+  const std::size_t p = source.noise_dimension();
+  source.states.push_back(std::move(state));
+  source.drift.push_back({integrand, {where, 1, 1, ""}, true});
+  source.diffusion.emplace_back(p, zero);
+  if (!source.initial) return;
+  if (!source.initial->mean.empty()) source.initial->mean.push_back(zero);
+  for (auto& row : source.initial->covariance) row.push_back(zero);
+  source.initial->covariance.emplace_back(source.states.size(), zero);
+}
+
 ModelSource read_model(std::string_view text, const std::string& file) {
   const TomlFile toml_file{file, split_lines(text)};
   try {

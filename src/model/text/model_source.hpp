@@ -1,5 +1,6 @@
 #pragma once
 /// A model file as read: every key checked for its name and type, expressions still text.
+#include <algorithm>
 #include <array>
 #include <optional>
 #include <string>
@@ -74,10 +75,21 @@ struct ModelSource {
   std::optional<ExactClaim> exact;
 
   std::size_t noise_dimension() const { return diffusion.front().size(); }
+  /// Where component i of field k was given; for the clock and for brackets of fields the last place there
+  /// is.
+  const SourceExpression& coefficient(std::size_t k, std::size_t i) const {
+    const std::size_t row = std::min(i, states.size() - 1);
+    return k == 0 ? drift[row] : diffusion[row][std::min(k, noise_dimension()) - 1];
+  }
 };
 
 /// @throws InputError naming file, line and key: TOML syntax, unknown or missing keys, wrong types, wrong
 /// shapes, duplicate or reserved names
 ModelSource read_model(std::string_view toml, const std::string& file);
+
+/// A further last state that starts from 0 and has this drift and no diffusion. `where` is how errors call
+/// it. @throws InputError if the name is no identifier, reserved or taken
+void add_integral(ModelSource& source, const std::string& name, const std::string& integrand,
+                  const std::string& where);
 
 }  // namespace wienertree::text

@@ -1,0 +1,209 @@
+#include "weak_arguments.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <thread>
+
+#include "data_directory.hpp"
+#include "formula_choice.hpp"
+#include "tree_choices.hpp"
+#include "wienertree/cubature/lie_formula.hpp"
+
+namespace wienertree::app {
+namespace {
+
+const Choices<GridKind> grids = {{"uniform", GridKind::uniform}, {"kusuoka", GridKind::kusuoka}};
+constexpr const char* discount_name = "discount_integral";
+
+void add_texts(CLI::App& app, const std::string& name, std::vector<std::string>& target,
+               const std::string& type, const std::string& help) {
+  app.add_option_function<std::vector<std::string>>(
+         name, [&target](const std::vector<std::string>& texts) { target = texts; }, help)
+      ->type_name(type)
+      ->expected(1)
+      ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
+}
+
+void refuse_if(bool given, const char* option, const std::string& reason) {
+  if (given) throw InputError(reason, option);
+}
+
+// "NAME=EXPR", but not the first half of a comparison: the language has none.
+struct NamedIntegrand {
+  std::string name, expression;
+};
+NamedIntegrand named_integrand(const std::string& text, const std::string& option) {
+  const std::size_t equals = text.find('=');
+  if (equals == std::string::npos || equals == 0) throw InputError("must be NAME=EXPR", option, text);
+  return {text.substr(0, equals), text.substr(equals + 1)};
+}
+
+BatchFunction discounted(BatchFunction payoff, double factor) {
+  if (factor == 1) return payoff;
+  return [payoff = std::move(payoff), factor](ConstBatchView x, std::span<double> out) {
+    payoff(x, out);
+    for (double& value : out) value *= factor;
+  };
+}
+
+// Recombination needs few nodes, since it keeps moments; random thinning many.
+std::size_t default_nodes(ThinningMethod thin, std::size_t dimension) {
+  if (thin != ThinningMethod::recombination) return 10000;
+  return dimension == 1 ? 300 : dimension == 2 ? 1000 : 3000;
+}
+
+void refuse_inapplicable(const WeakArguments& a, ThinningMethod thin, bool random) {
+  const std::string with_thinning = "has no meaning with --thin " + name_of(thinnings, thin);
+  refuse_if(a.nodes && thin == ThinningMethod::none, "--nodes", with_thinning);
+  refuse_if(a.order && !random, "--order", with_thinning);
+  refuse_if(a.recombination_degree && thin != ThinningMethod::recombination, "--recombination-degree",
+            with_thinning);
+  refuse_if(a.seed && !random, "--seed", with_thinning + ", which draws nothing");
+  refuse_if(a.launches && !random, "--launches", with_thinning + ", which draws nothing");
+  refuse_if(a.gamma && a.grid != GridKind::kusuoka, "--gamma", "has meaning only with --grid kusuoka");
+  const std::string with_exact_flow = "has no meaning with --flow exact";
+  refuse_if(a.flow == FlowMethod::exact && a.relative_tolerance, "--rtol", with_exact_flow);
+  refuse_if(a.flow == FlowMethod::exact && a.absolute_tolerance, "--atol", with_exact_flow);
+}
+
+// Below this many nodes, threads wait for each other longer than they work.
+constexpr std::size_t nodes_worth_threads = 5000;
+
+}  // namespace
+
+void add_weak_options(CLI::App& app, WeakArguments& a) {
+  app.add_option("MODEL", a.model, "A bundled model or a TOML file")->required();
+  add_texts(app, "--payoff", a.payoffs, "EXPR",
+            "What is averaged: an expression of states and parameters; may be repeated");
+  add_number(app, "--horizon", a.horizon, Sign::positive, "T, the time at which it is averaged")->required();
+  add_count(app, "--steps", a.steps, 1, "Steps of the tree", 1'000'000);
+  add_count(app, "--degree", a.degree, 1, "Degree of the cubature formula [5]", 99);
+  add_text(app, "--formula", a.formula, "NAME|FILE", "The cubature formula itself, instead of --degree");
+  add_choice(app, "--grid", a.grid, grids, "Steps of equal length, or shrinking towards T [uniform]");
+  add_number(app, "--gamma", a.gamma, Sign::positive,
+             "Exponent of Kusuoka's grid t_i = T (1 - (1 - i/n)^gamma) [degree]");
+  add_choice(app, "--thin", a.thin, thinnings, "How nodes are thinned out [recombination]");
+  add_count(app, "--nodes", a.nodes, 1, "Nodes kept at each step [by thinning and dimension]", 1'000'000'000);
+  add_choice(app, "--order", a.order, orders, "Order in which random thinning visits nodes [spatial]");
+  add_count(app, "--recombination-degree", a.recombination_degree, 1,
+            "Moments that recombination keeps [by dimension]", 99);
+  add_choice(app, "--flow", a.flow, flows, "How nodes move along a path [auto]");
+  add_number(app, "--rtol", a.relative_tolerance, Sign::positive, "Relative tolerance of the flow [1e-8]");
+  add_number(app, "--atol", a.absolute_tolerance, Sign::positive, "Absolute tolerance of the flow [1e-10]");
+  add_texts(app, "--average", a.averages, "STATE|NAME=EXPR",
+            "Adds the state average_STATE (or NAME), the time average over [0, T]; may be repeated");
+  add_texts(app, "--integral", a.integrals, "NAME=EXPR",
+            "Adds the state NAME, the integral over [0, T]; may be repeated");
+  add_text(app, "--discount", a.discount, "EXPR", "Payoffs are multiplied by exp(-integral of EXPR)");
+  app.add_flag("--richardson", a.richardson, "Extrapolate from n/2 and n steps");
+  add_count(app, "--launches", a.launches, 1, "Independent runs of a random thinning, averaged [1]",
+            1'000'000);
+  add_count(app, "--seed", a.seed, 0, "Seed of what is random [1]");
+  add_count(app, "--threads", a.threads, 1,
+            "Threads; results do not depend on them [1, or all for many nodes]", 1024);
+  add_assignments(app, a.parameters);
+}
+
+WeakProblem weak_problem(const WeakArguments& a) {
+  const TextModel model = TextModel::load(model_file(a.model).string(), a.parameters);
+  if (a.payoffs.empty()) throw InputError("is needed at least once", "--payoff");
+  std::vector<RunningIntegral> integrals;
+  for (const std::string& text : a.integrals) {
+    const auto [name, expression] = named_integrand(text, "--integral");
+    integrals.push_back({name, expression, "--integral"});
+  }
+  for (const std::string& text : a.averages) {
+    const bool named = text.find('=') != std::string::npos;
+    const auto [name, expression] =
+        named ? named_integrand(text, "--average") : NamedIntegrand{"average_" + text, text};
+    model.compile(expression, "--average");  // for the place of a mistake in it
+    integrals.push_back({name, fmt::format("({})/({:.17g})", expression, *a.horizon), "--average"});
+  }
+  WeakProblem problem{model, {}, a.payoffs, {}, 0, {}};
+  if (a.discount) {
+    if (const auto constant = model.constant(*a.discount, "--discount")) {
+      problem.discount_rate = *constant;
+    } else {
+      problem.discount_state =
+          model.model().state_dimension() - (model.model().has_clock ? 1 : 0) + integrals.size();
+      integrals.push_back({discount_name, *a.discount, "--discount"});
+    }
+  }
+  if (!integrals.empty() || model.model().observation != ObservationKind::none)
+    problem.source = model.with_integrals(integrals);
+  for (const RunningIntegral& integral : integrals) problem.added.push_back(integral.name);
+  const double factor = std::exp(-problem.discount_rate * *a.horizon);
+  for (const std::string& payoff : a.payoffs)
+    problem.average.push_back(discounted(problem.source.compile(payoff, "--payoff"), factor));
+  return problem;
+}
+
+DrivenFormula weak_formula(const WeakArguments& a, const WeakProblem& problem) {
+  const std::size_t p = problem.source.model().noise_dimension();
+  if (const auto lie = choose_lie_formula(a.degree, a.formula, p)) {
+    BracketFormula driven = bracket_formula(*lie);
+    return {std::move(driven.formula), problem.source.with_brackets(driven.brackets)};
+  }
+  return {choose_formula(a.degree, a.formula, p), problem.source.model()};
+}
+
+WeakRun weak_run(const WeakArguments& a, const WeakProblem& problem, CubatureFormula formula) {
+  const Model& model = problem.source.model();
+  WeakRun run;
+  WeakOptions& o = run.options;
+  o.thinning.method = a.thin.value_or(ThinningMethod::recombination);
+  const bool random = is_random(o);
+  refuse_inapplicable(a, o.thinning.method, random);
+  if (!a.steps) throw InputError("is needed", "--steps");
+  refuse_if(a.richardson && *a.steps < 2, "--richardson", "needs at least 2 --steps");
+  o.formula = std::move(formula);
+  const std::size_t folded = problem.discount_state ? 1 : 0;
+  o.nodes = a.nodes.value_or(default_nodes(o.thinning.method, model.reported_dimension() - folded));
+  o.thinning.order = a.order.value_or(SiteOrder::spatial);
+  o.thinning.recombination_degree = static_cast<int>(a.recombination_degree.value_or(0));
+  o.flow = a.flow.value_or(FlowMethod::automatic);
+  o.tolerance.relative = a.relative_tolerance.value_or(o.tolerance.relative);
+  o.tolerance.absolute = a.absolute_tolerance.value_or(o.tolerance.absolute);
+  o.seed = a.seed.value_or(1);
+  o.discount_state = problem.discount_state;
+  const bool many = o.thinning.method == ThinningMethod::none || o.nodes >= nodes_worth_threads;
+  o.threads =
+      static_cast<unsigned>(a.threads.value_or(many ? std::max(1U, std::thread::hardware_concurrency()) : 1));
+  run.grid = a.grid.value_or(GridKind::uniform);
+  run.horizon = *a.horizon;
+  run.steps = *a.steps;
+  run.gamma = a.gamma.value_or(o.formula.degree);
+  run.launches = static_cast<std::uint32_t>(a.launches.value_or(1));
+  run.richardson = a.richardson;
+  return run;
+}
+
+Json options_in_force(const WeakRun& run) {
+  const WeakOptions& o = run.options;
+  Json json;
+  json["horizon"] = run.horizon;
+  json["steps"] = run.steps;
+  json["degree"] = o.formula.degree;
+  json["formula"] = o.formula.name;
+  json["grid"] = name_of(grids, run.grid);
+  if (run.grid == GridKind::kusuoka) json["gamma"] = run.gamma;
+  json["thin"] = name_of(thinnings, o.thinning.method);
+  if (o.thinning.method != ThinningMethod::none) json["nodes"] = o.nodes;
+  if (is_random(o)) json["order"] = name_of(orders, o.thinning.order);
+  if (o.thinning.recombination_degree > 0) json["recombination-degree"] = o.thinning.recombination_degree;
+  json["flow"] = name_of(flows, o.flow);
+  if (o.flow != FlowMethod::exact) {
+    json["rtol"] = o.tolerance.relative;
+    json["atol"] = o.tolerance.absolute;
+  }
+  json["richardson"] = run.richardson;
+  if (is_random(o)) {
+    json["seed"] = o.seed;
+    json["launches"] = run.launches;
+  }
+  return json;
+}
+
+}  // namespace wienertree::app

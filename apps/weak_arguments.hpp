@@ -1,0 +1,58 @@
+#pragma once
+/// The options of `weak`, and the problem and the run they stand for.
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "command_line.hpp"
+#include "table.hpp"
+#include "wienertree/model/text_model.hpp"
+#include "wienertree/tree/weak_run.hpp"
+
+namespace wienertree::app {
+
+/// What was given on the command line; nothing else.
+struct WeakArguments {
+  std::string model;
+  Assignments parameters;
+  std::vector<std::string> payoffs, averages, integrals;
+  std::optional<std::string> discount, formula;
+  std::optional<double> horizon, gamma, relative_tolerance, absolute_tolerance, tolerance;
+  std::optional<std::uint64_t> steps, degree, nodes, seed, launches, threads, recombination_degree;
+  std::optional<GridKind> grid;
+  std::optional<ThinningMethod> thin;
+  std::optional<SiteOrder> order;
+  std::optional<FlowMethod> flow;
+  bool richardson = false;
+};
+
+void add_weak_options(CLI::App& app, WeakArguments& arguments);
+
+/// A model and what is to be averaged at its horizon.
+struct WeakProblem {
+  TextModel source;                           ///< the model with its added states
+  std::vector<std::string> added;             ///< names of these
+  std::vector<std::string> payoffs;           ///< as given
+  std::vector<BatchFunction> average;         ///< one a payoff
+  double discount_rate = 0;                   ///< where it is constant
+  std::optional<std::size_t> discount_state;  ///< where it is not
+};
+
+/// @throws InputError naming the option, with the column in an expression
+WeakProblem weak_problem(const WeakArguments& arguments);
+
+/// A formula with the model whose fields drive it.
+struct DrivenFormula {
+  CubatureFormula formula;
+  Model model;  ///< has brackets as further fields for a formula of Lie polynomials
+};
+DrivenFormula weak_formula(const WeakArguments& arguments, const WeakProblem& problem);
+
+/// Fills in the defaults. @throws InputError for an option that does not apply to another one
+WeakRun weak_run(const WeakArguments& arguments, const WeakProblem& problem, CubatureFormula formula);
+
+/// Names and values of all options in force.
+Json options_in_force(const WeakRun& run);
+
+}  // namespace wienertree::app

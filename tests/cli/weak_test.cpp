@@ -1,0 +1,137 @@
+/// weak: payoffs averaged by the tree, added states, and what is refused.
+#include <catch2/catch.hpp>
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "program.hpp"
+
+using cli::Outcome;
+using cli::Workplace;
+
+namespace {
+
+nlohmann::json rows_of(const Workplace& place, const std::string& arguments) {
+  const Outcome outcome = place.run("weak " + arguments + " --quiet --format json");
+  INFO(arguments << "\n" << outcome.err);
+  REQUIRE(outcome.code == 0);
+  CHECK(outcome.err.empty());
+  return nlohmann::json::parse(outcome.out)["rows"];
+}
+
+double value_of(const Workplace& place, const std::string& arguments) {
+  return rows_of(place, arguments)[0]["value"];
+}
+
+}  // namespace
+
+TEST_CASE("weak: several payoffs from one tree, as CSV, as JSON, in a file") {
+  const Workplace place;
+  const std::string command = "weak gbm --horizon 1 --steps 4 --payoff s --payoff max(s-100,0) --discount r";
+  const Outcome csv = place.run(command);
+  REQUIRE(csv.code == 0);
+  const auto lines = cli::lines_of(csv.out);
+  REQUIRE(lines.size() == 3);
+  CHECK(lines[0] == "payoff,value,standard_error,nodes,ode_solves,seconds");
+  CHECK_THAT(lines[1], Catch::StartsWith("s,"));
+  CHECK_THAT(lines[2], Catch::StartsWith("\"max(s-100,0)\","));
+  CHECK_THAT(csv.err, Catch::Contains("E[max(s-100,0)] = ") && Catch::Contains("ODE solves"));
+
+  REQUIRE(place.run(command + " --format json --output o.json --richardson").code == 0);
+  const auto json = nlohmann::json::parse(place.read("o.json"));
+  CHECK(json["options"]["discount"] == "r");
+  CHECK(json["options"]["steps"] == 4);
+  CHECK(json["options"]["degree"] == 5);
+  CHECK(json["rows"][1]["payoff"] == "max(s-100,0)");
+  for (const char* key : {"value", "standard_error", "extrapolated", "nodes", "ode_solves", "seconds"})
+    CHECK(json["rows"][0].contains(key));
+  // A discounted martingale: the error of degree 5 with 4 steps is 4e-6, extrapolated 1e-8.
+  CHECK(json["rows"][0]["value"].get<double>() == Approx(100).margin(1e-5));
+  CHECK(json["rows"][0]["extrapolated"].get<double>() == Approx(100).margin(1e-7));
+}
+
+TEST_CASE("weak: averages and integrals are states") {
+  const Workplace place;
+  // E (1/T) int_0^T s dt = s_0 (e^{rT} - 1)/(rT).
+  const double average = 100 * std::expm1(0.1) / 0.1;
+  const std::string gbm = "gbm --horizon 2 --steps 8 --degree 7 ";
+  CHECK(value_of(place, gbm + "--average s --payoff average_s") == Approx(average).epsilon(1e-8));
+  CHECK(value_of(place, gbm + "--average mean=s/100 --payoff 100*mean") == Approx(average).epsilon(1e-8));
+  CHECK(value_of(place, gbm + "--integral sum=s --payoff sum/2") == Approx(average).epsilon(1e-8));
+}
+
+TEST_CASE("weak: discounting along the path is a payoff of the integral, and a constant rate a factor") {
+  const Workplace place;
+  const std::string cir = "cir --horizon 1 --steps 3 --degree 7 --thin none ";
+  // The same tree: the two differ by the ODE's tolerance of 1e-8 and rounding.
+  CHECK(value_of(place, cir + "--payoff r --discount r") ==
+        Approx(value_of(place, cir + "--payoff r*exp(-integral)")).epsilon(1e-7));
+  CHECK(value_of(place, cir + "--payoff r --discount 0.5") ==
+        Approx(std::exp(-0.5) * value_of(place, cir + "--payoff r")).epsilon(1e-14));
+}
+
+TEST_CASE("weak: sampled trees have a standard error, and the same bytes for any number of threads") {
+  const Workplace place;
+  for (const std::string order : {"tree", "spatial"}) {
+    const std::string command =
+        "heston --horizon 1 --steps 6 --payoff max(s-1,0) --thin tbba --nodes 3000 "
+        "--launches 8 --seed 5 --order " +
+        order;
+    auto one = rows_of(place, command + " --threads 1")[0], two = rows_of(place, command + " --threads 2")[0];
+    one.erase("seconds");
+    two.erase("seconds");
+    CHECK(one == two);
+    CHECK(one["standard_error"].get<double>() > 0);
+  }
+  CHECK(rows_of(place, "gbm --horizon 1 --steps 3 --payoff s")[0]["standard_error"] == 0);
+}
+
+TEST_CASE("weak: formulas of Lie polynomials") {
+  const Workplace place;
+  REQUIRE(place.run("formulas construct --degree 5 --dimension 2 --lie --output lie.json").code == 0);
+  CHECK_THAT(place.run("formulas verify lie.json").out, Catch::Contains("holds to degree 5"));
+  CHECK_THAT(place.run("formulas show lie.json").out, Catch::Contains("[1,2]"));
+  // Both are of degree 5; at n = 6 either is within 2e-4 of 0.125741987887 + ... of this smooth payoff.
+  const std::string heston = "heston --horizon 1 --steps 6 --payoff s*s ";
+  CHECK(value_of(place, heston + "--formula ./lie.json") ==
+        Approx(value_of(place, heston + "--degree 5")).epsilon(1e-4));
+}
+
+TEST_CASE("weak: what is wrong is one line and exit code 2") {
+  const Workplace place;
+  const std::string gbm = "weak gbm --horizon 1 --steps 4 ";
+  const std::vector<std::pair<std::string, std::string>> cases = {
+      {gbm, "--payoff"},
+      {gbm + "--payoff q", "--payoff:1:1: unknown"},
+      {gbm + "--payoff s+", "--payoff"},
+      {gbm + "--payoff s --average q", "--average:1:1"},
+      {gbm + "--payoff s --average s --average s", "already that of a state"},
+      {gbm + "--payoff s --average r=s", "already that of a state or a parameter"},
+      {gbm + "--payoff s --integral s", "NAME=EXPR"},
+      {gbm + "--payoff s --discount q", "--discount:1:1"},
+      {"weak gbm --horizon 1 --payoff s", "--steps"},
+      {"weak gbm --horizon 0 --steps 2 --payoff s", "--horizon"},
+      {gbm + "--payoff s --gamma 3", "--grid kusuoka"},
+      {gbm + "--payoff s --launches 3", "draws nothing"},
+      {gbm + "--payoff s --thin none --nodes 10", "--nodes"},
+      {gbm + "--payoff s --thin tbba --recombination-degree 3", "--recombination-degree"},
+      {gbm + "--payoff s --degree 4", "no such formula"},
+      {gbm + "--payoff s --formula ninomiya-victoir-5-2", "2 Brownian motions, the model has 1"},
+      {gbm + "--payoff s --degree 5 --formula lyons-victoir-5-1", "not both"},
+      {"weak gbm --horizon 1 --steps 1 --payoff s --richardson", "at least 2"},
+      {"weak heston --horizon 1 --steps 12 --payoff s --thin none", "9^12 = 2.82e+11 leaves"},
+      {"weak heston --horizon 1 --steps 12 --payoff s --thin none", "--thin recombination"},
+      {gbm + "--payoff s --nodes 900000000", "--nodes"},
+      {"weak gmb --horizon 1 --steps 4 --payoff s", "gbm"},
+  };
+  for (const auto& [command, part] : cases) {
+    const Outcome outcome = place.run(command);
+    INFO(command << "\n" << outcome.err);
+    CHECK(outcome.code == 2);
+    CHECK(cli::lines_of(outcome.err).size() == 1);
+    CHECK_THAT(outcome.err, Catch::StartsWith("wienertree: ") && Catch::Contains(part));
+    CHECK(outcome.out.empty());
+  }
+  const Outcome failed = place.run("weak gbm --horizon 1 --steps 2 --payoff log(s-100)");
+  CHECK(failed.code == 1);
+  CHECK_THAT(failed.err, Catch::Contains("not finite"));
+}

@@ -1,0 +1,213 @@
+/// The iterated KLV operator: against an operator written out, against itself sampled, against closed forms.
+#include <catch2/catch.hpp>
+#include <cmath>
+
+#include "tree/statistics.hpp"
+#include "wienertree/cubature/construct.hpp"
+#include "wienertree/model/cpp_model.hpp"
+#include "wienertree/tree/weak_run.hpp"
+
+using namespace wienertree;
+
+namespace {
+
+/// Bounded fields that do not commute, of two components and two Brownian motions.
+struct Bent : CppModel<2, 2> {
+  static constexpr auto convention = Convention::stratonovich;
+  template <class T>
+  State<T> drift(const State<T>& x) const {
+    return {-0.5 * x[1], 0.3 * cos(x[0])};
+  }
+  template <class T>
+  Diffusion<T> diffusion(const State<T>& x) const {
+    return {{{0.4 * cos(x[1]), T(0.1)}, {T(0.2), 0.3 * sin(x[0]) + 0.5}}};
+  }
+};
+
+/// dX = (r - s^2/2) X dt + s X o dB, discounted at the rate X: the last component is the integral.
+struct Discounted : CppModel<2, 1> {
+  static constexpr auto convention = Convention::stratonovich;
+  template <class T>
+  State<T> drift(const State<T>& x) const {
+    return {0.03 * x[0], x[0]};
+  }
+  template <class T>
+  Diffusion<T> diffusion(const State<T>& x) const {
+    return {{{0.2 * x[0]}, {T(0)}}};
+  }
+};
+
+Model bent() { return make_model(Bent{}, {.name = "bent", .initial = {0.2, -0.1}}); }
+
+BatchFunction smooth_payoff() {
+  return [](ConstBatchView x, std::span<double> out) {
+    for (std::size_t n = 0; n < out.size(); ++n) out[n] = std::sin(x(0, n)) + x(1, n) * x(1, n);
+  };
+}
+
+BatchFunction component(std::size_t i) {
+  return [i](ConstBatchView x, std::span<double> out) {
+    std::copy(x.component(i).begin(), x.component(i).end(), out.begin());
+  };
+}
+
+/// The operator written out: recursion over paths, one node at a time.
+double klv(Flow& flow, const CubatureFormula& formula, std::array<double, 2> x, double s, int steps) {
+  if (steps == 0) return std::sin(x[0]) + x[1] * x[1];
+  double sum = 0;
+  for (const CubaturePath& path : formula.paths) {
+    Batch node(2, 1);
+    node(0, 0) = x[0];
+    node(1, 0) = x[1];
+    std::vector<NodeFailure> failures;
+    flow.move_along(path, s, node, failures);
+    sum += path.weight * klv(flow, formula, {node(0, 0), node(1, 0)}, s, steps - 1);
+  }
+  return sum;
+}
+
+WeakRun run_of(ThinningMethod method, SiteOrder order, std::size_t nodes) {
+  WeakRun run;
+  run.options.formula = construct(5, 2);
+  run.options.thinning = {method, order, 0};
+  run.options.nodes = nodes;
+  run.steps = 5;
+  return run;
+}
+
+}  // namespace
+
+TEST_CASE("the unpruned tree is the operator iterated") {
+  const Model model = bent();
+  WeakRun run = run_of(ThinningMethod::none, SiteOrder::spatial, 1);
+  run.steps = 3;
+  run.horizon = 0.9;
+  const WeakResult result = run_weak(model, {smooth_payoff(), component(1)}, run);
+  const auto flow = make_flow(FlowMethod::automatic, model, run.options.tolerance, 5);
+  // Blocks of one node and of 64 solve to the same tolerance of 1e-8 in different steps.
+  CHECK(result.value[0] == Approx(klv(*flow, run.options.formula, {0.2, -0.1}, 0.3, 3)).margin(1e-7));
+  CHECK(result.standard_error[0] == 0);
+  CHECK(result.leaves == 11 * 11 * 11);
+  CHECK(result.discarded == 0);
+}
+
+TEST_CASE("sampled trees are unbiased estimates of the unpruned one") {
+  const Model model = bent();
+  const double exact = run_weak(model, {smooth_payoff()}, run_of(ThinningMethod::none, {}, 1)).value[0];
+  constexpr std::uint32_t launches = 400;
+  const std::array cases = {std::pair{ThinningMethod::tbba, SiteOrder::tree},
+                            std::pair{ThinningMethod::tbba, SiteOrder::spatial},
+                            std::pair{ThinningMethod::systematic, SiteOrder::tree},
+                            std::pair{ThinningMethod::multinomial, SiteOrder::tree}};
+  for (const auto& [method, order] : cases) {
+    WeakRun run = run_of(method, order, 200);
+    run.launches = launches;
+    const WeakResult result = run_weak(model, {smooth_payoff()}, run);
+    INFO(static_cast<int>(method) << " " << static_cast<int>(order) << " " << result.standard_error[0]);
+    // H0: the mean of a launch is `exact`. The mean of 400 launches of bounded variables over its standard
+    // error is Student's t to a good approximation, whose tail at 399 degrees of freedom exceeds the normal
+    // bound's by less than a factor of 2: false alarms below 2e-7 in all.
+    CHECK(std::abs(result.value[0] - exact) <
+          wienertree_test::normal_bound(cases.size()) * result.standard_error[0]);
+    CHECK(result.standard_error[0] < 2e-2);
+  }
+}
+
+TEST_CASE("in tree order only the chosen children are moved") {
+  const Model model = bent();
+  const std::size_t segments = 4;  // at most, of a path of this formula
+  const WeakResult chosen =
+      run_weak(model, {component(0)}, run_of(ThinningMethod::tbba, SiteOrder::tree, 100));
+  const WeakResult all =
+      run_weak(model, {component(0)}, run_of(ThinningMethod::tbba, SiteOrder::spatial, 100));
+  CHECK(chosen.ode_solves <= 5 * 100 * segments);
+  CHECK(chosen.leaves <= 100);
+  CHECK(all.ode_solves > 3 * 100 * 11);
+}
+
+TEST_CASE("any number of threads gives the same bytes") {
+  const Model model = bent();
+  for (const auto method : {ThinningMethod::none, ThinningMethod::tbba, ThinningMethod::recombination})
+    for (const auto order : {SiteOrder::tree, SiteOrder::spatial}) {
+      WeakRun run = run_of(method, order, 3000);
+      const double one = run_weak(model, {smooth_payoff()}, run).value[0];
+      run.options.threads = 3;
+      CHECK(run_weak(model, {smooth_payoff()}, run).value[0] == one);
+    }
+}
+
+TEST_CASE("recombination reproduces the unpruned tree on a smooth payoff") {
+  const Model model = bent();
+  WeakRun run = run_of(ThinningMethod::none, {}, 1);
+  const double exact = run_weak(model, {smooth_payoff()}, run).value[0];
+  run.options.thinning.method = ThinningMethod::recombination;
+  run.options.nodes = 300;
+  const WeakResult thinned = run_weak(model, {smooth_payoff()}, run);
+  CHECK(thinned.leaves <= 300 * 11);
+  CHECK(thinned.value[0] == Approx(exact).margin(1e-5));
+  CHECK(thinned.discarded > 0);
+}
+
+TEST_CASE("a discount state is folded into the weights") {
+  const Model model = make_model(Discounted{}, {.name = "discounted", .initial = {0.5, 0}});
+  const auto explicit_payoff = [](ConstBatchView x, std::span<double> out) {
+    for (std::size_t n = 0; n < out.size(); ++n) out[n] = std::exp(-x(1, n)) * x(0, n);
+  };
+  WeakRun run;
+  run.options.formula = construct(5, 1);
+  run.options.thinning.method = ThinningMethod::none;
+  run.steps = 6;
+  const double value = run_weak(model, {explicit_payoff}, run).value[0];
+  run.options.discount_state = 1;
+  const WeakResult folded = run_weak(model, {component(0), component(1)}, run);
+  CHECK(folded.value[0] == Approx(value).epsilon(1e-7));  // the tolerance of the flow
+  CHECK(folded.value[1] == 0);                            // starts from 0 again
+  run.options.thinning = {ThinningMethod::recombination, SiteOrder::spatial, 0};
+  run.options.nodes = 40;
+  CHECK(run_weak(model, {component(0)}, run).value[0] == Approx(value).epsilon(1e-7));
+  run.options.discount_state = 2;
+  CHECK_THROWS_WITH(run_weak(model, {component(0)}, run), Catch::Contains("discount_state"));
+}
+
+TEST_CASE("extrapolation removes the leading error") {
+  const auto value = [](double n) { return 7 + 3 * std::pow(n, -3); };
+  CHECK(extrapolate(value(4), value(8), 4, 8, 7) == Approx(7).epsilon(1e-14));
+  CHECK(extrapolate(value(3), value(5), 3, 5, 7) == Approx(7).epsilon(1e-14));
+  const Model model = bent();
+  WeakRun run = run_of(ThinningMethod::none, {}, 1);
+  const WeakResult fine = run_weak(model, {smooth_payoff()}, run);
+  run.richardson = true;
+  const WeakResult both = run_weak(model, {smooth_payoff()}, run);
+  CHECK(both.value == fine.value);
+  run.steps = 3;
+  run.richardson = false;
+  const double coarse = run_weak(model, {smooth_payoff()}, run).value[0];
+  CHECK(both.extrapolated[0] == extrapolate(coarse, fine.value[0], 3, 5, 5));
+  CHECK(both.ode_solves > fine.ode_solves);
+}
+
+TEST_CASE("what cannot be run is refused with the reason") {
+  const Model model = bent();
+  WeakRun run = run_of(ThinningMethod::none, {}, 1);
+  const std::vector<BatchFunction> payoffs = {component(0)};
+  run.steps = 40;
+  CHECK_THROWS_WITH(run_weak(model, payoffs, run),
+                    Catch::Contains("11^40") && Catch::Contains("--thin recombination --nodes"));
+  run = run_of(ThinningMethod::recombination, {}, std::size_t{1} << 40);
+  CHECK_THROWS_WITH(run_weak(model, payoffs, run), Catch::Contains("fewer nodes"));
+  run = run_of(ThinningMethod::recombination, {}, 100);
+  run.options.formula = construct(5, 1);
+  CHECK_THROWS_WITH(run_weak(model, payoffs, run), Catch::Contains("2 Brownian motions"));
+  run = run_of(ThinningMethod::recombination, {}, 100);
+  run.launches = 0;
+  CHECK_THROWS_WITH(run_weak(model, payoffs, run), Catch::Contains("launches"));
+  run.launches = 1;
+  run.steps = 1;
+  run.richardson = true;
+  CHECK_THROWS_WITH(run_weak(model, payoffs, run), Catch::Contains("2 steps"));
+  run.richardson = false;
+  const BatchFunction pole = [](ConstBatchView, std::span<double> out) {
+    std::fill(out.begin(), out.end(), std::nan(""));
+  };
+  CHECK_THROWS_WITH(run_weak(model, {component(0), pole}, run), Catch::Contains("payoff 2"));
+}
