@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <set>
+
 #include "data_directory.hpp"
 #include "wienertree/cubature/catalogue.hpp"
 #include "wienertree/cubature/formula_file.hpp"
@@ -19,6 +21,17 @@ void require_dimension(int dimension, int p, const std::string& formula) {
 }
 
 }  // namespace
+
+std::vector<int> formula_degrees(std::size_t noise_dimension) {
+  const int p = static_cast<int>(noise_dimension);
+  std::set<int> degrees = {3};
+  if (p <= gaussian_cubature_5_max_dimension) degrees.insert(5);
+  for (const std::string& name : bundled_names("cubature_formulas", ".json")) {
+    const CubatureFormula formula = read_formula(formula_path(name, "--degree"));
+    if (formula.dimension == p) degrees.insert(formula.degree);
+  }
+  return {degrees.begin(), degrees.end()};
+}
 
 std::optional<LieFormula> choose_lie_formula(std::optional<std::uint64_t> degree,
                                              const std::optional<std::string>& formula,

@@ -10,6 +10,7 @@
 #include "formula_choice.hpp"
 #include "tree_choices.hpp"
 #include "wienertree/cubature/lie_formula.hpp"
+#include "wienertree/tree/weak_control.hpp"
 
 namespace wienertree::app {
 namespace {
@@ -40,9 +41,9 @@ NamedIntegrand named_integrand(const std::string& text, const std::string& optio
   return {text.substr(0, equals), text.substr(equals + 1)};
 }
 
-BatchFunction discounted(BatchFunction payoff, double factor) {
+BatchFunction discounted(const BatchFunction& payoff, double factor) {
   if (factor == 1) return payoff;
-  return [payoff = std::move(payoff), factor](ConstBatchView x, std::span<double> out) {
+  return [payoff, factor](ConstBatchView x, std::span<double> out) {
     payoff(x, out);
     for (double& value : out) value *= factor;
   };
@@ -96,7 +97,11 @@ void add_weak_options(CLI::App& app, WeakArguments& a) {
             "Adds the state average_STATE (or NAME), the time average over [0, T]; may be repeated");
   add_texts(app, "--integral", a.integrals, "NAME=EXPR",
             "Adds the state NAME, the integral over [0, T]; may be repeated");
+  add_number(app, "--kink-width", a.kink_width, Sign::any,
+             "Standard deviations over which max, min and abs in payoffs are smoothed; 0: not [0.4]");
   add_text(app, "--discount", a.discount, "EXPR", "Payoffs are multiplied by exp(-integral of EXPR)");
+  add_number(app, "--tolerance", a.tolerance, Sign::positive,
+             "Chooses steps, degree and nodes for this error, and estimates it part by part");
   app.add_flag("--richardson", a.richardson, "Extrapolate from n/2 and n steps");
   add_count(app, "--launches", a.launches, 1, "Independent runs of a random thinning, averaged [1]",
             1'000'000);
@@ -108,6 +113,8 @@ void add_weak_options(CLI::App& app, WeakArguments& a) {
 
 WeakProblem weak_problem(const WeakArguments& a) {
   const TextModel model = TextModel::load(model_file(a.model).string(), a.parameters);
+  if (a.kink_width && *a.kink_width < 0)
+    throw InputError("must not be negative", "--kink-width", fmt::format("{}", *a.kink_width));
   if (a.payoffs.empty()) throw InputError("is needed at least once", "--payoff");
   std::vector<RunningIntegral> integrals;
   for (const std::string& text : a.integrals) {
@@ -134,10 +141,37 @@ WeakProblem weak_problem(const WeakArguments& a) {
   if (!integrals.empty() || model.model().observation != ObservationKind::none)
     problem.source = model.with_integrals(integrals);
   for (const RunningIntegral& integral : integrals) problem.added.push_back(integral.name);
-  const double factor = std::exp(-problem.discount_rate * *a.horizon);
   for (const std::string& payoff : a.payoffs)
-    problem.average.push_back(discounted(problem.source.compile(payoff, "--payoff"), factor));
+    problem.kinked.push_back(problem.source.compile_kinked(payoff, "--payoff"));
   return problem;
+}
+
+double kink_width(const WeakArguments& a, const WeakProblem& problem) {
+  const bool kinks = std::any_of(problem.kinked.begin(), problem.kinked.end(),
+                                 [](const KinkedFunction& f) { return !f.kinks.empty(); });
+  return kinks ? a.kink_width.value_or(0.4) : 0;
+}
+
+std::vector<BatchFunction> averaged_payoffs(const WeakArguments& a, const WeakProblem& problem,
+                                            double narrower) {
+  std::vector<BatchFunction> payoffs =
+      smooth_payoffs(problem.source.model(), problem.kinked, *a.horizon, problem.discount_state,
+                     kink_width(a, problem) / narrower);
+  const double factor = std::exp(-problem.discount_rate * *a.horizon);
+  for (BatchFunction& payoff : payoffs) payoff = discounted(payoff, factor);
+  return payoffs;
+}
+
+std::vector<CubatureFormula> weak_formulas(const WeakArguments& a, const WeakProblem& problem) {
+  const std::size_t p = problem.source.model().noise_dimension();
+  if (choose_lie_formula(a.degree, a.formula, p))
+    throw InputError("chooses among formulas of paths: give --steps with this one", "--tolerance",
+                     *a.formula);
+  if (a.degree || a.formula) return {choose_formula(a.degree, a.formula, p)};
+  std::vector<CubatureFormula> formulas;
+  for (const int degree : formula_degrees(p))
+    if (degree > 3) formulas.push_back(choose_formula(static_cast<std::uint64_t>(degree), {}, p));
+  return formulas;
 }
 
 DrivenFormula weak_formula(const WeakArguments& a, const WeakProblem& problem) {
@@ -156,8 +190,14 @@ WeakRun weak_run(const WeakArguments& a, const WeakProblem& problem, CubatureFor
   o.thinning.method = a.thin.value_or(ThinningMethod::recombination);
   const bool random = is_random(o);
   refuse_inapplicable(a, o.thinning.method, random);
-  if (!a.steps) throw InputError("is needed", "--steps");
-  refuse_if(a.richardson && *a.steps < 2, "--richardson", "needs at least 2 --steps");
+  if (a.tolerance) {
+    refuse_if(a.steps.has_value(), "--steps", "is chosen by --tolerance: give one of them");
+    refuse_if(a.richardson, "--richardson", "is part of --tolerance");
+    refuse_if(random, "--tolerance", "needs a thinning that draws nothing: recombination or none");
+  } else if (!a.steps) {
+    throw InputError("give the number of steps, or the error with --tolerance", "--steps");
+  }
+  refuse_if(a.richardson && a.steps < 2, "--richardson", "needs at least 2 --steps");
   o.formula = std::move(formula);
   const std::size_t folded = problem.discount_state ? 1 : 0;
   o.nodes = a.nodes.value_or(default_nodes(o.thinning.method, model.reported_dimension() - folded));
@@ -168,16 +208,23 @@ WeakRun weak_run(const WeakArguments& a, const WeakProblem& problem, CubatureFor
   o.tolerance.absolute = a.absolute_tolerance.value_or(o.tolerance.absolute);
   o.seed = a.seed.value_or(1);
   o.discount_state = problem.discount_state;
+  for (const KinkedFunction& payoff : problem.kinked)
+    if (!payoff.kinks.empty() && !o.finest_along) o.finest_along = payoff.kinks.front();
   const bool many = o.thinning.method == ThinningMethod::none || o.nodes >= nodes_worth_threads;
   o.threads =
       static_cast<unsigned>(a.threads.value_or(many ? std::max(1U, std::thread::hardware_concurrency()) : 1));
   run.grid = a.grid.value_or(GridKind::uniform);
   run.horizon = *a.horizon;
-  run.steps = *a.steps;
+  run.steps = a.steps.value_or(0);
   run.gamma = a.gamma.value_or(o.formula.degree);
   run.launches = static_cast<std::uint32_t>(a.launches.value_or(1));
   run.richardson = a.richardson;
   return run;
+}
+
+std::size_t starting_nodes(const WeakProblem& problem) {
+  const std::size_t d = problem.source.model().reported_dimension() - (problem.discount_state ? 1 : 0);
+  return d == 1 ? 100 : 400;
 }
 
 Json options_in_force(const WeakRun& run) {

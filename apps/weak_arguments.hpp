@@ -18,7 +18,7 @@ struct WeakArguments {
   Assignments parameters;
   std::vector<std::string> payoffs, averages, integrals;
   std::optional<std::string> discount, formula;
-  std::optional<double> horizon, gamma, relative_tolerance, absolute_tolerance, tolerance;
+  std::optional<double> horizon, gamma, relative_tolerance, absolute_tolerance, tolerance, kink_width;
   std::optional<std::uint64_t> steps, degree, nodes, seed, launches, threads, recombination_degree;
   std::optional<GridKind> grid;
   std::optional<ThinningMethod> thin;
@@ -34,13 +34,19 @@ struct WeakProblem {
   TextModel source;                           ///< the model with its added states
   std::vector<std::string> added;             ///< names of these
   std::vector<std::string> payoffs;           ///< as given
-  std::vector<BatchFunction> average;         ///< one a payoff
+  std::vector<KinkedFunction> kinked;         ///< one a payoff
   double discount_rate = 0;                   ///< where it is constant
   std::optional<std::size_t> discount_state;  ///< where it is not
 };
 
 /// @throws InputError naming the option, with the column in an expression
 WeakProblem weak_problem(const WeakArguments& arguments);
+
+/// The payoffs as they are averaged, kinks smoothed over --kink-width divided by `narrower`.
+std::vector<BatchFunction> averaged_payoffs(const WeakArguments& arguments, const WeakProblem& problem,
+                                            double narrower = 1);
+/// Standard deviations over which kinks are smoothed; 0 if there are none.
+double kink_width(const WeakArguments& arguments, const WeakProblem& problem);
 
 /// A formula with the model whose fields drive it.
 struct DrivenFormula {
@@ -49,8 +55,15 @@ struct DrivenFormula {
 };
 DrivenFormula weak_formula(const WeakArguments& arguments, const WeakProblem& problem);
 
+/// The formulas that --tolerance chooses from: the one that is given, or the best of each degree above 3.
+/// @throws InputError if one of Lie polynomials is given
+std::vector<CubatureFormula> weak_formulas(const WeakArguments& arguments, const WeakProblem& problem);
+
 /// Fills in the defaults. @throws InputError for an option that does not apply to another one
 WeakRun weak_run(const WeakArguments& arguments, const WeakProblem& problem, CubatureFormula formula);
+
+/// The nodes with which --tolerance begins.
+std::size_t starting_nodes(const WeakProblem& problem);
 
 /// Names and values of all options in force.
 Json options_in_force(const WeakRun& run);

@@ -1,6 +1,8 @@
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <chrono>
+#include <cmath>
 #include <cstdio>
 #include <memory>
 
@@ -8,6 +10,7 @@
 #include "output.hpp"
 #include "progress.hpp"
 #include "weak_arguments.hpp"
+#include "wienertree/tree/weak_control.hpp"
 
 namespace wienertree::app {
 namespace {
@@ -21,18 +24,15 @@ struct WeakCommandArguments {
   bool quiet = false;
 };
 
-Table table_of(const WeakProblem& problem, const WeakResult& result, double seconds) {
-  Table table{{"value", "standard_error"}, {}, "payoff", problem.payoffs};
-  const bool extrapolated = !result.extrapolated.empty();
-  if (extrapolated)
-    table.columns.insert(table.columns.end(), {"extrapolated", "extrapolated_standard_error"});
-  table.columns.insert(table.columns.end(), {"nodes", "ode_solves", "seconds"});
-  for (std::size_t i = 0; i < problem.payoffs.size(); ++i) {
+// A row's numbers under their names.
+using Cells = std::vector<std::pair<std::string, double>>;
+
+Table table_of(const WeakProblem& problem, const std::vector<Cells>& rows) {
+  Table table{{}, {}, "payoff", problem.payoffs};
+  for (const auto& [name, value] : rows.front()) table.columns.push_back(name);
+  for (const Cells& cells : rows) {
     std::vector<double>& row = table.rows.emplace_back();
-    row = {result.value[i], result.standard_error[i]};
-    if (extrapolated) row.insert(row.end(), {result.extrapolated[i], result.extrapolated_standard_error[i]});
-    row.insert(row.end(),
-               {static_cast<double>(result.leaves), static_cast<double>(result.ode_solves), seconds});
+    for (const auto& [name, value] : cells) row.push_back(value);
   }
   return table;
 }
@@ -49,17 +49,19 @@ Json report_of(const WeakArguments& a, const WeakProblem& problem, const WeakRun
   if (!a.averages.empty()) options["average"] = a.averages;
   if (!a.integrals.empty()) options["integral"] = a.integrals;
   if (a.discount) options["discount"] = *a.discount;
+  if (a.tolerance) options["tolerance"] = *a.tolerance;
+  if (const double width = kink_width(a, problem); width > 0) options["kink-width"] = width;
   report["options"] = std::move(options);
   return report;
 }
 
-std::string summary_of(const WeakProblem& problem, const WeakRun& run, const WeakResult& result,
-                       double seconds) {
+std::string summary_of(const WeakArguments& a, const WeakProblem& problem, const WeakRun& run,
+                       const std::vector<std::string>& results) {
   std::string text =
       fmt::format("{}, t = {:g}: degree {}, {} step{}\n", problem.source.model().name, run.horizon,
                   run.options.formula.degree, run.steps, run.steps == 1 ? "" : "s");
   std::string separator = "  ";
-  const Json options = options_in_force(run);
+  const Json options = report_of(a, problem, run)["options"];
   for (const auto& [name, value] : options.items()) {
     text +=
         fmt::format("{}{} {}", separator, name, value.is_string() ? value.get<std::string>() : value.dump());
@@ -68,40 +70,106 @@ std::string summary_of(const WeakProblem& problem, const WeakRun& run, const Wea
   std::size_t width = 0;
   for (const std::string& payoff : problem.payoffs) width = std::max(width, payoff.size());
   text += "\n\n";
+  for (std::size_t i = 0; i < problem.payoffs.size(); ++i)
+    text += fmt::format("  E[{}]{:{}} = {}\n", problem.payoffs[i], "", width - problem.payoffs[i].size(),
+                        results[i]);
+  return text;
+}
+
+// What a run has to show.
+struct Outcome {
+  std::vector<Cells> rows;
+  std::vector<std::string> results;  ///< one a payoff, for people
+  WeakRun run;
+  std::size_t leaves = 0;
+  std::uint64_t ode_solves = 0;
+};
+
+Outcome with_given_steps(const WeakArguments& a, const WeakProblem& problem, bool quiet) {
+  DrivenFormula driven = weak_formula(a, problem);
+  Outcome outcome;
+  outcome.run = weak_run(a, problem, std::move(driven.formula));
+  WeakRun& run = outcome.run;
+  const std::size_t trees = run.launches * (run.richardson ? std::size_t{2} : std::size_t{1});
+  Progress progress("weak", trees * run.steps, !quiet);
+  std::size_t done = 0;
+  run.options.observe = [&](std::size_t) { progress.advance_to(++done); };
+  const WeakResult result = run_weak(driven.model, averaged_payoffs(a, problem), run);
+  outcome.leaves = result.leaves;
+  outcome.ode_solves = result.ode_solves;
   for (std::size_t i = 0; i < problem.payoffs.size(); ++i) {
-    text += fmt::format("  E[{}]{:{}} = {:.12g}", problem.payoffs[i], "", width - problem.payoffs[i].size(),
-                        result.value[i]);
+    Cells& row = outcome.rows.emplace_back();
+    std::string& text = outcome.results.emplace_back();
+    row = {{"value", result.value[i]}, {"standard_error", result.standard_error[i]}};
+    text = fmt::format("{:.12g}", result.value[i]);
     if (run.launches > 1) text += fmt::format(" +- {:.2g}", result.standard_error[i]);
-    if (run.richardson) text += fmt::format(", extrapolated {:.12g}", result.extrapolated[i]);
-    if (run.richardson && run.launches > 1)
-      text += fmt::format(" +- {:.2g}", result.extrapolated_standard_error[i]);
-    text += '\n';
+    if (!run.richardson) continue;
+    row.insert(row.end(), {{"extrapolated", result.extrapolated[i]},
+                           {"extrapolated_standard_error", result.extrapolated_standard_error[i]}});
+    text += fmt::format(", extrapolated {:.12g}", result.extrapolated[i]);
+    if (run.launches > 1) text += fmt::format(" +- {:.2g}", result.extrapolated_standard_error[i]);
   }
-  return text + fmt::format("\n  {} nodes at the end, {} ODE solves, {:.3g} s\n", result.leaves,
-                            result.ode_solves, seconds);
+  return outcome;
+}
+
+Outcome to_tolerance(const WeakArguments& a, const WeakProblem& problem, bool quiet) {
+  WeakTarget target;
+  target.tolerance = *a.tolerance;
+  target.formulas = weak_formulas(a, problem);
+  target.choose_nodes = !a.nodes;
+  target.choose_accuracy = !a.relative_tolerance && !a.absolute_tolerance && a.flow != FlowMethod::exact;
+  WeakRun run = weak_run(a, problem, target.formulas.front());
+  if (target.choose_nodes) run.options.nodes = starting_nodes(problem);
+  if (target.choose_accuracy) run.options.tolerance = {1e-6, 1e-8};
+  // Kinks smoothed over less show what smoothing does: its error falls by 2^6.
+  std::vector<BatchFunction> smoother;
+  if (kink_width(a, problem) > 0) smoother = averaged_payoffs(a, problem, std::sqrt(2.0));
+  Progress progress("weak", 0, !quiet);
+  std::size_t done = 0;
+  run.options.observe = [&](std::size_t) { progress.advance_to(++done); };
+  const auto payoffs = [&](double narrower) { return averaged_payoffs(a, problem, narrower); };
+  const ControlledResult result = weak_to_tolerance(problem.source.model(), payoffs, run, target);
+  Outcome outcome;
+  outcome.run = result.run;
+  outcome.leaves = result.leaves;
+  outcome.ode_solves = result.ode_solves;
+  for (std::size_t i = 0; i < problem.payoffs.size(); ++i) {
+    const WeakErrorSplit& e = result.error[i];
+    outcome.rows.push_back({{"value", result.value[i]},
+                            {"standard_error", 0},
+                            {"error", e.total()},
+                            {"error_discretisation", e.discretisation},
+                            {"error_thinning", e.thinning},
+                            {"error_ode", e.ode},
+                            {"error_sampling", e.sampling}});
+    outcome.results.push_back(
+        fmt::format("{:.12g}, error about {:.1e} = discretisation {:.1e} + thinning {:.1e} + ODE {:.1e} + "
+                    "sampling {:.1e}",
+                    result.value[i], e.total(), e.discretisation, e.thinning, e.ode, e.sampling));
+  }
+  return outcome;
 }
 
 void approximate_and_write(const WeakCommandArguments& a) {
   const auto began = std::chrono::steady_clock::now();
   OutputFile output("--output", a.output.value_or("-"));
   const WeakProblem problem = weak_problem(a.weak);
-  DrivenFormula driven = weak_formula(a.weak, problem);
-  WeakRun run = weak_run(a.weak, problem, std::move(driven.formula));
-  const std::size_t trees = run.launches * (run.richardson ? std::size_t{2} : std::size_t{1});
-  WeakResult result;
-  {
-    Progress progress("weak", trees * run.steps, !a.quiet);
-    std::size_t done = 0;
-    run.options.observe = [&](std::size_t) { progress.advance_to(++done); };
-    result = run_weak(driven.model, problem.average, run);
-  }
+  Outcome outcome =
+      a.weak.tolerance ? to_tolerance(a.weak, problem, a.quiet) : with_given_steps(a.weak, problem, a.quiet);
   const std::chrono::duration<double> took = std::chrono::steady_clock::now() - began;
-  const Table table = table_of(problem, result, took.count());
+  for (Cells& row : outcome.rows)
+    row.insert(row.end(), {{"nodes", static_cast<double>(outcome.leaves)},
+                           {"ode_solves", static_cast<double>(outcome.ode_solves)},
+                           {"seconds", took.count()}});
+  const Table table = table_of(problem, outcome.rows);
   output.stage(a.format.value_or(TableFormat::csv) == TableFormat::csv
                    ? to_csv(table)
-                   : to_json(report_of(a.weak, problem, run), table));
+                   : to_json(report_of(a.weak, problem, outcome.run), table));
   output.publish();
-  if (!a.quiet) std::fputs(summary_of(problem, run, result, took.count()).c_str(), stderr);
+  if (a.quiet) return;
+  const std::string work = fmt::format("\n  {} nodes at the end, {} ODE solves, {:.3g} s\n", outcome.leaves,
+                                       outcome.ode_solves, took.count());
+  std::fputs((summary_of(a.weak, problem, outcome.run, outcome.results) + work).c_str(), stderr);
 }
 
 }  // namespace

@@ -9,6 +9,7 @@
 
 #include "wienertree/model/text/assembly.hpp"
 #include "wienertree/model/text/exact_filter.hpp"
+#include "wienertree/model/text/smoothing.hpp"
 
 namespace wienertree {
 
@@ -135,30 +136,57 @@ ModelAnalysis TextModel::analysis() const {
   return result;
 }
 
-BatchFunction TextModel::compile(std::string_view expression, const std::string& where) const {
-  const text::SourceExpression source{std::string(expression), {where, 1, 1, ""}, true};
-  text::Arena arena;
-  const text::Expression e = text::state_expression(source, contents_->source, contents_->model.has_clock,
-                                                    contents_->parameters, arena);
-  const std::size_t d = contents_->model.state_dimension();
-  TapeBuilder builder(d, 0);
+namespace {
+
+BatchFunction batch_function(text::Expression e, std::size_t d, std::vector<double> uniforms) {
+  TapeBuilder builder(d, uniforms.size());
   text::TapeSymbols symbols;
   for (std::size_t i = 0; i < d; ++i) symbols.states.push_back(builder.input(i));
+  for (std::size_t i = 0; i < uniforms.size(); ++i) symbols.observations.push_back(builder.uniform(i));
   const TapeBuilder::Value output = text::emit(e, symbols, builder);
-  return [tape = builder.finish(std::span(&output, 1))](ConstBatchView x, std::span<double> out) {
+  return [tape = builder.finish(std::span(&output, 1)), uniforms = std::move(uniforms)](
+             ConstBatchView x, std::span<double> out) {
     thread_local std::vector<const double*> inputs;
     inputs.clear();
     for (std::size_t i = 0; i < x.components(); ++i) inputs.push_back(x.component(i).data());
     double* const outputs = out.data();
-    tape.evaluate(inputs, {}, std::span(&outputs, 1), x.nodes());
+    tape.evaluate(inputs, uniforms, std::span(&outputs, 1), x.nodes());
   };
 }
 
-std::optional<double> TextModel::constant(std::string_view expression, const std::string& where) const {
+}  // namespace
+
+text::Expression TextModel::bound_expression(std::string_view expression, const std::string& where,
+                                             text::Arena& arena) const {
   const text::SourceExpression source{std::string(expression), {where, 1, 1, ""}, true};
+  return text::state_expression(source, contents_->source, contents_->model.has_clock, contents_->parameters,
+                                arena);
+}
+
+BatchFunction TextModel::compile(std::string_view expression, const std::string& where) const {
   text::Arena arena;
-  const text::Expression e = text::state_expression(source, contents_->source, contents_->model.has_clock,
-                                                    contents_->parameters, arena);
+  return batch_function(bound_expression(expression, where, arena), contents_->model.state_dimension(), {});
+}
+
+KinkedFunction TextModel::compile_kinked(std::string_view expression, const std::string& where) const {
+  const auto arena = std::make_shared<text::Arena>();
+  const text::Expression e = bound_expression(expression, where, *arena);
+  const std::size_t d = contents_->model.state_dimension();
+  const text::SmoothedKinks smoothed = text::smooth_kinks(e, *arena);
+  KinkedFunction function{batch_function(e, d, {}), {}, {}};
+  for (const text::Expression argument : smoothed.arguments)
+    function.kinks.push_back(batch_function(argument, d, {}));
+  function.smoothed = [arena, value = smoothed.value, d](std::span<const double> widths) {
+    std::vector<double> inverse;
+    for (const double width : widths) inverse.push_back(1 / width);
+    return batch_function(value, d, std::move(inverse));
+  };
+  return function;
+}
+
+std::optional<double> TextModel::constant(std::string_view expression, const std::string& where) const {
+  text::Arena arena;
+  const text::Expression e = bound_expression(expression, where, arena);
   if (!e->is_number()) return {};
   return e->number;
 }

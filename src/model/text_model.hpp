@@ -17,6 +17,11 @@
 
 namespace wienertree {
 
+namespace text {
+class Arena;
+struct Node;
+}  // namespace text
+
 /// Values that replace parameters of a file: (name, value).
 using ParameterOverrides = std::vector<std::pair<std::string, double>>;
 
@@ -68,6 +73,9 @@ class TextModel {
   /// @throws InputError with the column of the offending symbol
   BatchFunction compile(std::string_view expression, const std::string& where) const;
 
+  /// The same with its kinks, where max, min or abs are not differentiable: over a smooth law the average of
+  /// the smoothed function differs by O(h^12), h the width of smoothing (text/smoothing.hpp has the kernel).
+  KinkedFunction compile_kinked(std::string_view expression, const std::string& where) const;
   /// The value of an expression in which no state occurs, nor t; nothing if one does. Otherwise as `compile`.
   std::optional<double> constant(std::string_view expression, const std::string& where) const;
 
@@ -84,6 +92,8 @@ class TextModel {
   struct Contents;
   explicit TextModel(std::shared_ptr<const Contents> contents) : contents_(std::move(contents)) {}
   static std::shared_ptr<Contents> build(Contents contents);
+  const text::Node* bound_expression(std::string_view expression, const std::string& where,
+                                     text::Arena& arena) const;
   std::shared_ptr<const Contents> contents_;
 };
 

@@ -2,10 +2,12 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <utility>
 
 #include "wienertree/tree/growth.hpp"
+#include "wienertree/tree/slabs.hpp"
 #include "wienertree/tree/tree_size.hpp"
 
 namespace wienertree {
@@ -35,6 +37,13 @@ class WeakTree {
                          options.thinning.method != ThinningMethod::recombination),
         thinning_(pruned_ ? make_thinning(options.thinning) : nullptr),
         grower_(model, options.flow, options.tolerance, options.formula, options.threads) {
+    // The discount state is 0 for all, and a clock the same: they are no dimensions to be thinned in.
+    const std::size_t dimensions =
+        model.reported_dimension() - (options.discount_state ? std::size_t{1} : std::size_t{0});
+    directed_ =
+        options.finest_along && dimensions > 1 && options.thinning.method == ThinningMethod::recombination;
+    if (directed_) drift_flow_ = make_flow(options.flow, model, {1e-4, 1e-6}, 3);
+    drift_increments_.assign(1 + model.noise_dimension(), 0.0);
     for (const CubaturePath& path : options.formula.paths) log_lambda_.push_back(std::log(path.weight));
   }
 
@@ -91,10 +100,31 @@ class WeakTree {
       std::swap(nodes_, children_);
       return;
     }
-    thinning_->thin({children_.states, children_.log_weight, nodes_.size()}, options_.nodes, random,
-                    selection_);
+    if (directed_) {
+      look_ahead(options_.grid.back() - options_.grid[j]);
+      slabs_.thin(children_, value_, options_.nodes, random, *thinning_, selection_);
+    } else {
+      thinning_->thin({children_.states, children_.log_weight, nodes_.size()}, options_.nodes, random,
+                      selection_);
+    }
     select(children_, selection_, nodes_);
     discarded_ += selection_.discarded;
+  }
+
+  // The value at T of what thinning is finest along, each child moved by the drift V_0 alone. It only decides
+  // what is near what: a child that cannot be moved so is taken where it is.
+  void look_ahead(double remaining) {
+    const std::size_t sites = children_.size(), d = children_.states.components();
+    ahead_.reshape(d, sites);
+    for (std::size_t i = 0; i < d; ++i)
+      std::copy_n(children_.states.component(i).begin(), sites, ahead_.component(i).begin());
+    drift_increments_[0] = remaining;
+    drift_flow_->move(drift_increments_, ahead_, failures_);
+    for (const NodeFailure& f : failures_)
+      for (std::size_t i = 0; i < d; ++i) ahead_(i, f.node) = children_.states(i, f.node);
+    failures_.clear();
+    value_.resize(sites);
+    options_.finest_along(ahead_, value_);
   }
 
   void step_by_weight(std::size_t j, const RandomStream& random) {
@@ -119,6 +149,11 @@ class WeakTree {
   std::vector<double> log_lambda_, site_weight_;
   Generation nodes_, children_;
   Selection selection_;
+  bool directed_;
+  std::unique_ptr<Flow> drift_flow_;
+  std::vector<double> drift_increments_, value_;
+  Batch ahead_;
+  Slabs slabs_;
   std::vector<NodeFailure> failures_;
   double discarded_ = 0;
 };

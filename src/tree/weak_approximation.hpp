@@ -23,6 +23,9 @@ struct WeakOptions {
   std::vector<double> grid;  ///< from time_grid
   std::size_t nodes = 1000;  ///< N, the budget of the thinning; `none` has no use for it
   ThinningOptions thinning = {ThinningMethod::recombination, SiteOrder::spatial, 0};
+  /// What the payoffs bend along, the argument of a kink, say; may be empty. In two dimensions and more
+  /// recombination is then finest along its value at T on the path without noise (slabs.hpp).
+  BatchFunction finest_along = {};
   FlowMethod flow = FlowMethod::automatic;
   FlowTolerance tolerance;
   std::uint64_t seed = 1;
