@@ -12,6 +12,7 @@
 #include "data_directory.hpp"
 #include "output.hpp"
 #include "wienertree/model/text_model.hpp"
+#include "wienertree/version.hpp"
 
 namespace wienertree::app {
 namespace {

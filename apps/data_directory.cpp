@@ -1,5 +1,8 @@
 #include "data_directory.hpp"
 
+#include <dlfcn.h>
+#include <link.h>
+
 #include <algorithm>
 #include <cstdlib>
 #include <system_error>
@@ -12,9 +15,29 @@ namespace {
 
 namespace fs = std::filesystem;
 
-fs::path directory_of_program() {
+// The program or, where this code is part of one, the shared object.
+fs::path this_binary() {
+  static const char here = 0;
+  Dl_info info;
+  link_map* object = nullptr;
   std::error_code failure;
-  return fs::read_symlink("/proc/self/exe", failure).parent_path();
+  if (::dladdr1(&here, &info, reinterpret_cast<void**>(&object), RTLD_DL_LINKMAP) != 0 && object != nullptr &&
+      object->l_name[0] != '\0')
+    return fs::canonical(object->l_name, failure);
+  return fs::read_symlink("/proc/self/exe", failure);
+}
+
+bool is_below(const fs::path& file, const fs::path& directory) {
+  const fs::path relative = file.lexically_relative(directory);
+  return !relative.empty() && *relative.begin() != "..";
+}
+
+// share/wienertree beside bin/ or lib/, however deep below that the binary lies.
+fs::path installed_data(const fs::path& binary) {
+  std::error_code failure;
+  for (fs::path above = binary.parent_path(); above.has_relative_path(); above = above.parent_path())
+    if (fs::path data = above / "share" / "wienertree"; fs::is_directory(data, failure)) return data;
+  return WIENERTREE_INSTALLED_DATA;
 }
 
 fs::path bundled_file(const std::string& name, const std::string& folder, const std::string& extension,
@@ -32,11 +55,11 @@ fs::path data_directory() {
   fs::path directory;
   if (const char* set = std::getenv("WIENERTREE_DATA"); set != nullptr && *set != '\0') {
     directory = set;
-  } else if (const fs::path here = directory_of_program(); here == WIENERTREE_BUILD_DIRECTORY) {
+  } else if (const fs::path binary = this_binary(); is_below(binary, WIENERTREE_BUILD_DIRECTORY "/apps") ||
+                                                    is_below(binary, WIENERTREE_BUILD_DIRECTORY "/python")) {
     directory = WIENERTREE_SOURCE_DATA;
   } else {
-    directory = here.parent_path() / "share" / "wienertree";
-    if (std::error_code failure; !fs::is_directory(directory, failure)) directory = WIENERTREE_INSTALLED_DATA;
+    directory = installed_data(binary);
   }
   if (std::error_code failure; !fs::is_directory(directory, failure))
     throw InputError("the bundled data is not there; WIENERTREE_DATA may name its directory", "data",

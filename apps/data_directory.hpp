@@ -6,8 +6,8 @@
 
 namespace wienertree::app {
 
-/// $WIENERTREE_DATA if set; else the source tree's data/ for a program that runs from its build tree; else
-/// share/wienertree beside the directory of the installed program.
+/// $WIENERTREE_DATA if set; else the source tree's data/ for a program (or a Python module) in its build
+/// tree; else share/wienertree under the prefix it is installed in.
 /// @throws InputError if that is not a directory
 std::filesystem::path data_directory();
 

@@ -1,4 +1,5 @@
 #include "filter_report.hpp"
+#include "wienertree/version.hpp"
 
 #include <fmt/format.h>
 

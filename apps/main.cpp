@@ -1,27 +1,11 @@
 /// The program `wienertree`: parsing, progress, files and pictures around the library.
-#include "command_line.hpp"
-#include "commands.hpp"
 #include "output.hpp"
+#include "program.hpp"
 
 int main(int argc, char** argv) {
   using namespace wienertree::app;
   install_signal_handlers();
-  CLI::App program("Cubature on Wiener space: nonlinear filtering by the Kusuoka-Lyons-Victoir tree",
-                   "wienertree");
-  program.set_version_flag("--version", "wienertree " WIENERTREE_VERSION, "Print the version and exit");
-  program.require_subcommand(1);
-  program.footer(
-      "A model is a name (wienertree model list) or a TOML file. For example:\n"
-      "  wienertree simulate benes --horizon 10 --steps 10000 --seed 1 --observations Y.csv --signal X.csv\n"
-      "  wienertree filter benes --observations Y.csv --signal X.csv --output posterior.csv --plot "
-      "posterior.svg\n"
-      "Each subcommand has its own --help.");
-  add_simulate_command(program);
-  add_filter_command(program);
-  add_compare_command(program);
-  add_weak_command(program);
-  add_formulas_command(program);
-  add_model_command(program);
-  add_tree_command(program);
+  CLI::App program;
+  describe_program(program);
   return run_program(program, argc, argv);
 }

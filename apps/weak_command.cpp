@@ -11,6 +11,7 @@
 #include "progress.hpp"
 #include "weak_arguments.hpp"
 #include "wienertree/tree/weak_control.hpp"
+#include "wienertree/version.hpp"
 
 namespace wienertree::app {
 namespace {

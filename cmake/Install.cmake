@@ -12,6 +12,7 @@ endif()
 install(TARGETS ${installed} EXPORT wienertree-targets ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR})
 install(EXPORT wienertree-targets NAMESPACE wienertree:: DESTINATION ${CMAKE_INSTALL_LIBDIR}/cmake/wienertree)
 install(DIRECTORY src/ DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/wienertree FILES_MATCHING PATTERN "*.hpp")
+install(FILES ${PROJECT_BINARY_DIR}/generated/wienertree/version.hpp DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/wienertree)
 install(DIRECTORY data/ DESTINATION ${CMAKE_INSTALL_DATADIR}/wienertree)
 install(FILES LICENSE README.md DESTINATION ${CMAKE_INSTALL_DOCDIR})
 

@@ -1,6 +1,8 @@
 # Headers are included as "wienertree/<folder>/<name>.hpp", in the source tree as after install.
 file(MAKE_DIRECTORY ${PROJECT_BINARY_DIR}/include)
 file(CREATE_LINK ${PROJECT_SOURCE_DIR}/src ${PROJECT_BINARY_DIR}/include/wienertree SYMBOLIC)
+# The version stands in project() alone.
+configure_file(src/version.hpp.in ${PROJECT_BINARY_DIR}/generated/wienertree/version.hpp @ONLY)
 
 add_library(wienertree_build_settings INTERFACE)
 target_compile_options(wienertree_build_settings INTERFACE
@@ -20,6 +22,7 @@ function(wienertree_room name)
   target_compile_features(wienertree_${name} PUBLIC cxx_std_20)
   target_include_directories(wienertree_${name} PUBLIC
     $<BUILD_INTERFACE:${PROJECT_BINARY_DIR}/include>
+    $<BUILD_INTERFACE:${PROJECT_BINARY_DIR}/generated>
     $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}>)
   target_link_libraries(wienertree_${name} PRIVATE $<BUILD_INTERFACE:wienertree_build_settings>)
 endfunction()
