@@ -3,6 +3,7 @@
 ///
 ///     build/bench/bench/scaling            (some minutes; 7 GiB for N = 1e7)
 ///     build/bench/bench/scaling 1e6        up to N = 1e6
+///     build/bench/bench/scaling benes 1e5 100 1    one run (model, N, n, threads), to be profiled
 #include <fmt/format.h>
 #include <sys/resource.h>
 #include <sys/wait.h>
@@ -124,9 +125,16 @@ void heading(const char* what) {
 }  // namespace
 
 int main(int argc, char** argv) {
+  if (argc == 5) {
+    const Cost c = filter_once({argv[1], static_cast<std::size_t>(std::atof(argv[2])),
+                                static_cast<std::size_t>(std::atoi(argv[3])),
+                                static_cast<unsigned>(std::atoi(argv[4]))});
+    fmt::print("{:.3g} s, {:.1f} ns a child\n", c.wall, 1e9 * c.processor / c.children);
+    return 0;
+  }
   const double most = argc > 1 ? std::atof(argv[1]) : 1e7;
   if (!(most >= 1e3)) {
-    fmt::print(stderr, "usage: scaling [largest N, at least 1e3]\n");
+    fmt::print(stderr, "usage: scaling [largest N, at least 1e3] | MODEL N n THREADS\n");
     return 2;
   }
   heading("Nodes (degree 5, second-order, TBBA in spatial order)");

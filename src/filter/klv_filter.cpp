@@ -12,6 +12,11 @@
 #include "wienertree/tree/tree_size.hpp"
 
 namespace wienertree {
+namespace {
+
+constexpr std::size_t block = 1024;  ///< nodes a task: their sensor values stay in cache
+
+}  // namespace
 
 KlvFilter::KlvFilter(const Model& model, const FilterOptions& options)
     : model_(model),
@@ -62,11 +67,16 @@ void KlvFilter::observe_start(const ObservationWindow& window) {
   if (model_.observation != ObservationKind::continuous) return;
   const std::size_t k = model_.fields->sensor_dimension(), p = model_.noise_dimension();
   sensor_.reshape(k, survivors_.size());
-  model_.fields->sensor(survivors_.states, sensor_);
   derivative_.reshape(functional_->uses_derivative() ? k * p : 0, survivors_.size());
-  if (functional_->uses_derivative()) model_.fields->sensor_derivative(survivors_.states, derivative_);
   start_term_.resize(survivors_.size());
-  functional_->at_start(window, sensor_, derivative_, start_term_);
+  for_blocks(
+      &grower_.threads(), survivors_.size(), block, [&](std::size_t first, std::size_t count, std::size_t) {
+        const ConstBatchView x = std::as_const(survivors_.states).view().nodes(first, count);
+        const BatchView h0 = sensor_.view().nodes(first, count), G = derivative_.view().nodes(first, count);
+        model_.fields->sensor(x, h0);
+        if (functional_->uses_derivative()) model_.fields->sensor_derivative(x, G);
+        functional_->at_start(window, h0, G, std::span(start_term_).subspan(first, count));
+      });
 }
 
 void KlvFilter::grow(const ObservationWindow& window) {
@@ -101,8 +111,7 @@ void KlvFilter::weigh(const ObservationWindow& window) {
     return;
   }
   if (model_.observation == ObservationKind::none) return;
-  // Tasks are blocks of one branch each, whose sensor values stay in cache.
-  constexpr std::size_t block = 1024;
+  // Tasks are blocks of one branch each.
   const std::size_t blocks = (parents + block - 1) / block;
   for (Batch& scratch : child_sensor_) scratch.reshape(sensor_.components(), std::min(block, parents));
   grower_.threads().for_each(options_.formula.paths.size() * blocks, [&](std::size_t task,

@@ -61,6 +61,15 @@ void gather(std::span<const T> from, std::span<const std::uint32_t> site, std::s
 }
 
 template <class T>
+void copy_column(std::span<const T> from, std::vector<T>& to, ThreadPool* threads) {
+  to.resize(from.size());
+  for_blocks(threads, from.size(), nodes_a_task, [&](std::size_t first, std::size_t count, std::size_t) {
+    std::copy_n(from.begin() + static_cast<std::ptrdiff_t>(first), count,
+                to.begin() + static_cast<std::ptrdiff_t>(first));
+  });
+}
+
+template <class T>
 void gather(const std::vector<T>& from, std::span<const std::uint32_t> site, std::vector<T>& to,
             ThreadPool* threads) {
   to.resize(from.empty() ? 0 : site.size());
@@ -198,10 +207,12 @@ void select(const Generation& children, const Selection& selection, Generation& 
   const std::span<const std::uint32_t> site = selection.site;
   const std::size_t kept = site.size(), d = children.states.components();
   assert(selection.log_weight.size() == kept && &children != &survivors);
-  for (const std::uint32_t i : site)
-    if (i >= children.size())
-      throw InputError(fmt::format("a selected site is not one of {} children", children.size()), "selection",
-                       fmt::format("{}", i));
+  for_blocks(threads, kept, nodes_a_task, [&](std::size_t first, std::size_t count, std::size_t) {
+    for (const std::uint32_t i : site.subspan(first, count))
+      if (i >= children.size())
+        throw InputError(fmt::format("a selected site is not one of {} children", children.size()),
+                         "selection", fmt::format("{}", i));
+  });
   survivors.time = children.time;
   if (selection.moved_states.nodes() != 0) {
     assert(selection.moved_states.nodes() == kept && selection.moved_states.components() == d);
@@ -211,8 +222,8 @@ void select(const Generation& children, const Selection& selection, Generation& 
     for (std::size_t i = 0; i < d; ++i)
       gather(children.states.component(i), site, survivors.states.component(i), threads);
   }
-  survivors.log_weight = selection.log_weight;
-  survivors.count = selection.count;
+  copy_column<double>(selection.log_weight, survivors.log_weight, threads);
+  copy_column<std::uint32_t>(selection.count, survivors.count, threads);
   gather(children.log_likelihood, site, survivors.log_likelihood, threads);
   gather(children.parent, site, survivors.parent, threads);
   gather(children.branch, site, survivors.branch, threads);

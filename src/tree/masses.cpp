@@ -61,7 +61,10 @@ void assign_masses(std::span<const double> log_weight, std::uint64_t particles, 
     const auto [value, all_valid] = largest_log_weight(log_weight.subspan(first, count));
     scratch[b] = all_valid ? value : infinity;
   });
-  const double largest = n > 0 ? *std::max_element(scratch.begin(), scratch.end()) : -infinity;
+  const auto heaviest_block = std::max_element(scratch.begin(), scratch.end());
+  const auto heaviest_from =
+      log_weight.begin() + static_cast<std::ptrdiff_t>(block) * (heaviest_block - scratch.begin());
+  const double largest = n > 0 ? *heaviest_block : -infinity;
   if (!std::isfinite(largest)) refuse(log_weight);
 
   out.mass.resize(n);
@@ -93,7 +96,7 @@ void assign_masses(std::span<const double> log_weight, std::uint64_t particles, 
     assigned += here;
   });
   const auto heaviest =
-      static_cast<std::size_t>(std::find(log_weight.begin(), log_weight.end(), largest) - log_weight.begin());
+      static_cast<std::size_t>(std::find(heaviest_from, log_weight.end(), largest) - log_weight.begin());
   out.mass[heaviest] += (particles << out.fraction_bits) - assigned;  // modulo 2^64: may subtract
 }
 

@@ -1,6 +1,8 @@
 #include "wienertree/tree/prefix_sort.hpp"
 
+#include <algorithm>
 #include <array>
+#include <atomic>
 #include <utility>
 
 namespace wienertree {
@@ -8,15 +10,36 @@ namespace {
 
 constexpr std::size_t most_runs = 8;
 
-// Starts of the ascending runs, and the end; 0 if there are more than `most_runs`.
-std::size_t find_runs(std::span<const std::uint64_t> items, std::array<std::size_t, most_runs + 1>& start) {
+// Starts of the ascending runs, and the end; 0 if there are more than `most_runs`. Descents are counted block
+// by block, and looked for only where there is one.
+std::size_t find_runs(std::span<const std::uint64_t> items, std::array<std::size_t, most_runs + 1>& start,
+                      ThreadPool* threads) {
+  constexpr std::size_t block = 4096;
+  const auto descents = [&](std::size_t first, std::size_t count) {
+    std::size_t found = 0;
+    for (std::size_t i = std::max<std::size_t>(first, 1); i < first + count; ++i)
+      found += items[i] < items[i - 1] ? 1 : 0;
+    return found;
+  };
+  std::array<std::size_t, most_runs> found_block{};
+  std::atomic<std::size_t> blocks_found = 0;
+  for_blocks(threads, items.size(), block, [&](std::size_t first, std::size_t count, std::size_t) {
+    if (blocks_found.load(std::memory_order_relaxed) > most_runs || descents(first, count) == 0) return;
+    const std::size_t k = blocks_found.fetch_add(1, std::memory_order_relaxed);
+    if (k < most_runs) found_block[k] = first;
+  });
+  if (blocks_found > most_runs) return 0;
+  const std::span<std::size_t> with_descent(found_block.data(), blocks_found.load());
+  for (auto i = with_descent.begin(); i != with_descent.end(); ++i)  // by insertion: they are few
+    std::rotate(std::upper_bound(with_descent.begin(), i, *i), i, i + 1);
   std::size_t runs = 1;
   start[0] = 0;
-  for (std::size_t i = 1; i < items.size(); ++i)
-    if (items[i] < items[i - 1]) {
-      if (runs == most_runs) return 0;
-      start[runs++] = i;
-    }
+  for (const std::size_t first : with_descent)
+    for (std::size_t i = std::max<std::size_t>(first, 1); i < std::min(first + block, items.size()); ++i)
+      if (items[i] < items[i - 1]) {
+        if (runs == most_runs) return 0;
+        start[runs++] = i;
+      }
   start[runs] = items.size();
   return runs;
 }
@@ -121,7 +144,7 @@ void radix_sort(std::vector<std::uint64_t>& items, std::vector<std::uint64_t>& s
 
 void sort_items(std::vector<std::uint64_t>& items, std::vector<std::uint64_t>& scratch, ThreadPool* threads) {
   std::array<std::size_t, most_runs + 1> start;
-  const std::size_t runs = items.empty() ? 1 : find_runs(items, start);
+  const std::size_t runs = items.empty() ? 1 : find_runs(items, start, threads);
   if (runs == 1) return;
   if (runs > 1)
     merge_runs(items, scratch, runs, start, threads);

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 #include "wienertree/model/error.hpp"
 #include "wienertree/tree/prefix_sort.hpp"
@@ -16,16 +17,34 @@ constexpr std::size_t least_sample = 64, largest_sample = 1024;
 constexpr std::size_t block = 16384;  ///< sites a task; a multiple of hilbert_block
 static_assert(block % hilbert_block == 0);
 
-// Appends every site of finite log-weight that `site_at` names, without branching.
-template <class SiteAt>
-void live_sites(std::span<const double> log_weight, std::size_t n, SiteAt site_at,
-                std::vector<std::uint32_t>& out) {
-  out.resize(n);
+// Every site of finite log-weight among the `count` that `next` names, written to `out`, without branching.
+// Returns their number; the place behind the last is scratch.
+template <class Next>
+std::size_t write_live(std::span<const double> log_weight, std::size_t count, Next next, std::uint32_t* out) {
   std::size_t kept = 0;
-  for (std::size_t i = 0; i < n; ++i) {
-    const std::size_t site = site_at(i);
+  for (std::size_t i = 0; i < count; ++i) {
+    const std::size_t site = next();
     out[kept] = static_cast<std::uint32_t>(site);
     kept += log_weight[site] > -std::numeric_limits<double>::infinity() ? 1 : 0;
+  }
+  return kept;
+}
+
+// walk_from(i) names the i-th site and those after it, call by call. Blocks are written side by side, each to
+// the places of its sites, and moved together if one has a dead site.
+template <class WalkFrom>
+void live_sites(std::span<const double> log_weight, WalkFrom walk_from, ThreadPool* threads,
+                std::vector<std::uint32_t>& out, std::vector<std::size_t>& live) {
+  const std::size_t n = log_weight.size();
+  out.resize(n);
+  live.resize((n + block - 1) / block);
+  for_blocks(threads, n, block, [&](std::size_t first, std::size_t count, std::size_t b) {
+    live[b] = write_live(log_weight, count, walk_from(first), out.data() + first);
+  });
+  std::size_t kept = 0;
+  for (std::size_t b = 0; b < live.size(); ++b) {
+    if (kept != b * block) std::copy_n(out.data() + b * block, live[b], out.data() + kept);
+    kept += live[b];
   }
   out.resize(kept);
 }
@@ -35,35 +54,33 @@ inline std::uint32_t cell(double x, double low, double scale, double cells) {
   return static_cast<std::uint32_t>(static_cast<std::int64_t>(std::min(std::max(position, 0.0), cells - 1)));
 }
 
+constexpr auto as_stored = [](std::size_t first) { return [i = first]() mutable { return i++; }; };
+
 }  // namespace
 
 void SiteOrdering::tree(const Sites& sites, std::vector<std::uint32_t>& visit) {
   const std::size_t n = sites.log_weight.size(), parents = sites.parents;
-  if (parents == 0) {
-    live_sites(
-        sites.log_weight, n, [](std::size_t i) { return i; }, visit);
-    return;
-  }
+  if (parents == 0) return live_sites(sites.log_weight, as_stored, sites.threads, visit, live_);
   if (n % parents != 0)
     throw InputError(fmt::format("{} sites are not a whole number of branches of {} parents", n, parents),
                      "tree order");
   const std::size_t branches = n / parents;
-  std::size_t parent = 0, branch = 0;
-  const auto next = [&](std::size_t) {
-    const std::size_t site = branch * parents + parent;
-    const bool wrap = ++branch == branches;
-    branch = wrap ? 0 : branch;
-    parent += wrap ? 1 : 0;
-    return site;
+  const auto by_parent = [=](std::size_t first) {
+    return [=, parent = first / branches, branch = first % branches]() mutable {
+      const std::size_t site = branch * parents + parent;
+      const bool wrap = ++branch == branches;
+      branch = wrap ? 0 : branch;
+      parent += wrap ? 1 : 0;
+      return site;
+    };
   };
-  live_sites(sites.log_weight, n, next, visit);
+  live_sites(sites.log_weight, by_parent, sites.threads, visit, live_);
 }
 
 void SiteOrdering::spatial(const Sites& sites, const ParticleMasses& masses,
                            std::vector<std::uint32_t>& visit) {
-  live_sites(
-      sites.log_weight, sites.log_weight.size(), [](std::size_t i) { return i; }, visit);
-  draw_sample(masses);
+  live_sites(sites.log_weight, as_stored, sites.threads, visit, live_);
+  draw_sample(masses, sites.threads);
   axes_.clear();
   Axis axis;
   for (std::size_t c = 0; c < sites.x.components(); ++c)
@@ -84,28 +101,50 @@ void SiteOrdering::spatial(const Sites& sites, const ParticleMasses& masses,
 }
 
 // Sites at equal steps of mass: a sample of the weighted measure.
-void SiteOrdering::draw_sample(const ParticleMasses& masses) {
-  const std::size_t size = std::clamp(masses.mass.size() / 4, least_sample, largest_sample);
+void SiteOrdering::draw_sample(const ParticleMasses& masses, ThreadPool* threads) {
+  const std::size_t n = masses.mass.size(), size = std::clamp(n / 4, least_sample, largest_sample);
   const std::uint64_t step = (masses.particles << masses.fraction_bits) / size;
-  sample_.clear();
-  sample_.reserve(size + 1);
-  std::uint64_t below = 0, next = step / 2;
-  for (std::size_t i = 0; i < masses.mass.size(); ++i) {
-    below += masses.mass[i];
-    for (; next < below; next += step) sample_.push_back(static_cast<std::uint32_t>(i));
-  }
+  below_.resize((n + block - 1) / block);
+  for_blocks(threads, n, block, [&](std::size_t first, std::size_t count, std::size_t b) {
+    below_[b] = 0;
+    for (const std::uint64_t m : std::span(masses.mass).subspan(first, count)) below_[b] += m;
+  });
+  // The k-th lies where the mass below reaches step/2 + k step.
+  std::uint64_t total = 0;
+  for (std::uint64_t& m : below_) total += std::exchange(m, total);
+  const auto samples_below = [=](std::uint64_t mass) { return (mass + step - 1 - step / 2) / step; };
+  sample_.resize(samples_below(total));
+  for_blocks(threads, n, block, [&](std::size_t first, std::size_t, std::size_t b) {
+    std::uint64_t k = samples_below(below_[b]), behind = below_[b];
+    const std::uint64_t last = samples_below(b + 1 < below_.size() ? below_[b + 1] : total);
+    for (std::size_t i = first; k < last; ++i) {
+      behind += masses.mass[i];
+      for (; k < last && step / 2 + k * step < behind; ++k) sample_[k] = static_cast<std::uint32_t>(i);
+    }
+  });
 }
 
 // False if the component is constant over the sites.
 bool SiteOrdering::make_axis(const Sites& sites, std::span<const std::uint32_t> live, std::size_t component,
                              Axis& axis) {
   const std::span<const double> x = sites.x.component(component);
-  double least = std::numeric_limits<double>::infinity(), most = -least;
+  constexpr double infinity = std::numeric_limits<double>::infinity();
+  range_.resize((live.size() + block - 1) / block);
+  for_blocks(sites.threads, live.size(), block, [&](std::size_t first, std::size_t count, std::size_t b) {
+    Range here;
+    for (const std::uint32_t i : live.subspan(first, count)) {
+      here.finite &= std::abs(x[i]) <= std::numeric_limits<double>::max();
+      here.least = x[i] < here.least ? x[i] : here.least;
+      here.most = x[i] > here.most ? x[i] : here.most;
+    }
+    range_[b] = here;
+  });
+  double least = infinity, most = -infinity;
   bool finite = true;
-  for (const std::uint32_t i : live) {
-    finite &= std::abs(x[i]) <= std::numeric_limits<double>::max();
-    least = x[i] < least ? x[i] : least;
-    most = x[i] > most ? x[i] : most;
+  for (const Range& r : range_) {
+    finite &= r.finite;
+    least = std::min(least, r.least);
+    most = std::max(most, r.most);
   }
   if (!finite)
     for (const std::uint32_t i : live)

@@ -4,6 +4,7 @@
 /// Gerber, Chopin (2015), "Sequential quasi Monte Carlo", J. R. Stat. Soc. B 77, 509-579, for Hilbert's
 /// curve.
 #include <cstdint>
+#include <limits>
 #include <span>
 #include <vector>
 
@@ -35,12 +36,19 @@ class SiteOrdering {
     std::size_t component;
     double low, scale;  ///< cell of x on a side of n cells: (x/4 - low) scale n, within 0..n-1
   };
+  struct Range {
+    double least = std::numeric_limits<double>::infinity(), most = -least;
+    bool finite = true;
+  };
   bool make_axis(const Sites& sites, std::span<const std::uint32_t> live, std::size_t component, Axis& axis);
-  void draw_sample(const ParticleMasses& masses);
+  void draw_sample(const ParticleMasses& masses, ThreadPool* threads);
   void line_items(const Sites& sites, std::span<const std::uint32_t> live);
   void curve_items(const Sites& sites, std::span<const std::uint32_t> live);
 
   std::vector<Axis> axes_;
+  std::vector<Range> range_;          ///< each block of sites
+  std::vector<std::size_t> live_;     ///< likewise
+  std::vector<std::uint64_t> below_;  ///< likewise: its mass
   std::vector<std::uint32_t> sample_;
   std::vector<double> sample_values_;
   std::vector<std::uint64_t> items_, scratch_, keys_;
