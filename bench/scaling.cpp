@@ -9,10 +9,12 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <cstdlib>
 #include <string>
+#include <vector>
 
 #include "papers/benes_problem.hpp"
 #include "wienertree/cubature/construct.hpp"
@@ -31,7 +33,9 @@ struct Setting {
 struct Cost {
   double wall = 0, processor = 0;          ///< seconds
   double base_memory = 0, memory = 0;      ///< bytes: before the first step, and at most
-  double children = 0, last_children = 0;  ///< over all steps, and of the last
+  double children = 0, most_children = 0;  ///< over all steps, and of one at most
+  double full_processor = 0,
+         full_children = 0;  ///< of the steps of a full tree, whose memory has all been touched
 };
 
 double peak_bytes() {
@@ -64,12 +68,27 @@ Cost filter_once(const Setting& s) {
   cost.base_memory = peak_bytes();
   const double processor = processor_seconds();
   const auto start = std::chrono::steady_clock::now();
-  run(*filter, windows, {});
+  ObservationWindow window;
+  int thinned = 0;
+  for (std::size_t k = 0; k < windows.size(); ++k) {
+    windows.get(k, window);
+    const auto before = filter->statistics().children;
+    const double then = processor_seconds();
+    filter->advance(window);
+    const auto children = static_cast<double>(filter->statistics().children - before);
+    // A step is full if its parents were thinned, and so were theirs.
+    if (cost.most_children > static_cast<double>(s.N)) ++thinned;
+    if (thinned > 1) {
+      cost.full_processor += processor_seconds() - then;
+      cost.full_children += children;
+    }
+    cost.most_children = std::max(cost.most_children, children);
+  }
+  filter->posterior();
   cost.wall = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   cost.processor = processor_seconds() - processor;
   cost.memory = peak_bytes();
   cost.children = static_cast<double>(filter->statistics().children);
-  cost.last_children = static_cast<double>(filter->posterior().size());
   return cost;
 }
 
@@ -95,31 +114,37 @@ Cost in_own_process(const Setting& s) {
   return cost;
 }
 
-// The best of a few: other work on the machine only adds.
-Cost measure(const Setting& s) {
-  Cost best = in_own_process(s);
-  for (int k = 1; k < (s.N <= 100'000 ? 5 : 3); ++k) {
-    const Cost again = in_own_process(s);
-    best.wall = std::min(best.wall, again.wall);
-    best.processor = std::min(best.processor, again.processor);
-  }
+// The best of some rounds over all settings: other work on the machine only adds, and a machine whose speed
+// drifts treats all alike.
+std::vector<Cost> measure(const std::vector<Setting>& settings) {
+  std::vector<Cost> best;
+  for (int round = 0; round < 3; ++round)
+    for (std::size_t i = 0; i < settings.size(); ++i) {
+      const Cost c = in_own_process(settings[i]);
+      if (round == 0) best.push_back(c);
+      best[i].wall = std::min(best[i].wall, c.wall);
+      best[i].processor = std::min(best[i].processor, c.processor);
+      best[i].full_processor = std::min(best[i].full_processor, c.full_processor);
+      best[i].memory = std::min(best[i].memory, c.memory);
+    }
   return best;
 }
 
-double row(const Setting& s) {
-  const Cost c = measure(s);
-  fmt::print("| {} | {:.0e} | {} | {} | {:.3g} | {:.3g} | {:.1f} | {:.0f} |\n", s.model,
-             static_cast<double>(s.N), s.n, s.threads, c.wall, c.processor, 1e9 * c.processor / c.children,
-             (c.memory - c.base_memory) / c.last_children);
-  std::fflush(stdout);
-  return c.wall;
-}
-
-void heading(const char* what) {
+std::vector<Cost> table(const char* what, const std::vector<Setting>& settings) {
   fmt::print(
-      "\n{}\n\n| model | N | n | threads | s | processor s | ns a child | bytes a child |\n"
-      "|---|---|---|---|---|---|---|---|\n",
+      "\n{}\n\n| model | N | n | threads | s | processor s | ns a child | of a full step | bytes a child |\n"
+      "|---|---|---|---|---|---|---|---|---|\n",
       what);
+  const std::vector<Cost> cost = measure(settings);
+  for (std::size_t i = 0; i < settings.size(); ++i) {
+    const Setting& s = settings[i];
+    const Cost& c = cost[i];
+    fmt::print("| {} | {:.0e} | {} | {} | {:.3g} | {:.3g} | {:.1f} | {:.1f} | {:.0f} |\n", s.model,
+               static_cast<double>(s.N), s.n, s.threads, c.wall, c.processor, 1e9 * c.processor / c.children,
+               1e9 * c.full_processor / c.full_children, (c.memory - c.base_memory) / c.most_children);
+  }
+  std::fflush(stdout);
+  return cost;
 }
 
 }  // namespace
@@ -137,16 +162,20 @@ int main(int argc, char** argv) {
     fmt::print(stderr, "usage: scaling [largest N, at least 1e3] | MODEL N n THREADS\n");
     return 2;
   }
-  heading("Nodes (degree 5, second-order, TBBA in spatial order)");
+  std::vector<Setting> nodes;
   for (double N = 1e3; N <= most * 1.001; N *= 10)
-    row({"benes", static_cast<std::size_t>(std::llround(N)), 20, 1});
-  heading("Steps");
-  for (const std::size_t n : {20, 40, 80, 160}) row({"benes", 100'000, n, 1});
-  heading("Dimension: linear-3d has d = 3, p = 2, 13 paths");
-  for (const double N : {1e3, 1e4, 1e5}) row({"linear-3d", static_cast<std::size_t>(N), 20, 1});
-  heading("Threads");
+    nodes.push_back({"benes", static_cast<std::size_t>(std::llround(N)), 20, 1});
+  table("Nodes (degree 5, second-order, TBBA in spatial order)", nodes);
+  table("Steps", {{"benes", 100'000, 20, 1},
+                  {"benes", 100'000, 40, 1},
+                  {"benes", 100'000, 80, 1},
+                  {"benes", 100'000, 160, 1}});
+  table("Dimension: linear-3d has d = 3, p = 2, 13 paths",
+        {{"linear-3d", 1'000, 20, 1}, {"linear-3d", 10'000, 20, 1}, {"linear-3d", 100'000, 20, 1}});
   const auto large = static_cast<std::size_t>(std::min(most, 1e6));
-  const double one = row({"benes", large, 20, 1});
-  for (const unsigned threads : {2U, 4U, 8U})
-    fmt::print("  {} threads: {:.2f} times one\n", threads, one / row({"benes", large, 20, threads}));
+  const std::vector<Cost> threads = table(
+      "Threads",
+      {{"benes", large, 40, 1}, {"benes", large, 40, 2}, {"benes", large, 40, 4}, {"benes", large, 40, 8}});
+  fmt::print("\n2 threads: {:.2f} times one; 4: {:.2f}; 8: {:.2f}\n", threads[0].wall / threads[1].wall,
+             threads[0].wall / threads[2].wall, threads[0].wall / threads[3].wall);
 }

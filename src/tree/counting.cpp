@@ -62,11 +62,12 @@ void CountingThinning::thin(const Sites& sites, std::size_t budget, const Random
     return;
   }
   put_in_order(order_, ordering_, sites, masses_, visit_);
-  visited_mass_.resize(visit_.size());
+  std::vector<std::uint64_t>& visited_mass = ordering_.workspace();
+  visited_mass.resize(visit_.size());
   for_blocks(sites.threads, visit_.size(), block, [&](std::size_t first, std::size_t count, std::size_t) {
-    for (std::size_t i = first; i < first + count; ++i) visited_mass_[i] = masses_.mass[visit_[i]];
+    for (std::size_t i = first; i < first + count; ++i) visited_mass[i] = masses_.mass[visit_[i]];
   });
-  count_particles(visited_mass_, random, sites.threads);
+  count_particles(visited_mass, random, sites.threads);
   collect([this](std::size_t i) { return visit_[i]; }, sites.threads, out);
 }
 

@@ -31,7 +31,6 @@ class CountingThinning final : public Thinning {
   SiteOrdering ordering_;
   ParticleMasses masses_;
   std::vector<std::uint32_t> visit_, count_;
-  std::vector<std::uint64_t> visited_mass_;
   std::vector<std::size_t> kept_before_;  ///< each block of sites
   std::vector<double> log_small_;         ///< log o for small o > 0
 };

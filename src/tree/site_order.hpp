@@ -31,6 +31,9 @@ class SiteOrdering {
   /// @throws InputError if more than 64 components vary
   void spatial(const Sites& sites, const ParticleMasses& masses, std::vector<std::uint32_t>& visit);
 
+  /// Memory of the last sort, which is free until the next one.
+  std::vector<std::uint64_t>& workspace() { return scratch_; }
+
  private:
   struct Axis {
     std::size_t component;
