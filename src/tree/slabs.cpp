@@ -4,7 +4,14 @@
 #include <cmath>
 #include <numeric>
 
+#include "wienertree/tree/recombination.hpp"
+
 namespace wienertree {
+
+std::size_t Slabs::number(std::size_t dimension, std::size_t budget) {
+  const std::size_t nodes_a_slab = 6 * moment_number(dimension, 3, budget), most = dimension == 2 ? 8 : 24;
+  return std::clamp<std::size_t>(budget / nodes_a_slab, 1, most);
+}
 
 void Slabs::thin(const Generation& sites, const std::vector<double>& value, std::size_t budget,
                  const RandomStream& random, Thinning& thinning, Selection& out) {
@@ -16,7 +23,7 @@ void Slabs::thin(const Generation& sites, const std::vector<double>& value, std:
   });
   double mass = 0, below = 0;
   for (const double w : sites.log_weight) mass += std::exp(w);
-  const std::size_t slabs = std::max<std::size_t>(1, budget / nodes_a_slab);
+  const std::size_t slabs = number(d, budget);
   out.site.clear();
   out.log_weight.clear();
   out.count.clear();

@@ -15,12 +15,14 @@ namespace wienertree {
 
 class Slabs {
  public:
-  /// Nodes a slab should keep: enough for some patches with moments of degree 2 in 3 dimensions, few enough
-  /// for slabs of a twentieth of the mass with a thousand nodes.
-  static constexpr std::size_t nodes_a_slab = 50;
+  /// How many slabs share N nodes in d >= 2 dimensions: as many as leave each the nodes with which
+  /// recombination keeps moments of degree 3 in several patches, but at most 8 (d = 2) or 24. Further nodes
+  /// make the patches of every slab smaller in all directions; slabs that became thinner for ever, their
+  /// patches as wide across, would leave an error that does not fall with N.
+  static std::size_t number(std::size_t dimension, std::size_t budget);
 
   /// @param value one a site, the direction
-  /// @param budget N >= 1, shared by N / nodes_a_slab slabs
+  /// @param budget N >= 1, shared by the slabs
   void thin(const Generation& sites, const std::vector<double>& value, std::size_t budget,
             const RandomStream& random, Thinning& thinning, Selection& out);
 
