@@ -74,8 +74,9 @@ std::string show_model(const std::string& name, const Assignments& parameters) {
   const TextModel source = TextModel::load(model_file(name).string(), parameters);
   const Model& model = source.model();
   const ModelAnalysis a = source.analysis();
-  std::string text = fmt::format("{}: {} states, {} Brownian motion{}\n", a.name, model.reported_dimension(),
-                                 model.noise_dimension(), model.noise_dimension() == 1 ? "" : "s");
+  std::string text = fmt::format("{}: {} state{}, {} Brownian motion{}\n", a.name, model.reported_dimension(),
+                                 model.reported_dimension() == 1 ? "" : "s", model.noise_dimension(),
+                                 model.noise_dimension() == 1 ? "" : "s");
   text += "\nparameters\n";
   if (a.parameters.empty()) text += "  none\n";
   for (const auto& [parameter, value] : a.parameters) text += fmt::format("  {} = {}\n", parameter, value);

@@ -10,7 +10,7 @@
 #include "formula_choice.hpp"
 #include "tree_choices.hpp"
 #include "wienertree/cubature/lie_formula.hpp"
-#include "wienertree/tree/weak_control.hpp"
+#include "wienertree/tree/weak_smoothing.hpp"
 
 namespace wienertree::app {
 namespace {
@@ -51,7 +51,8 @@ BatchFunction discounted(const BatchFunction& payoff, double factor) {
 
 // Recombination needs few nodes, since it keeps moments; random thinning many.
 std::size_t default_nodes(ThinningMethod thin, std::size_t dimension) {
-  if (thin != ThinningMethod::recombination) return 10000;
+  if (thin == ThinningMethod::levelwise) return 100;  // one patch, whose cost grows with the cube
+  if (!recombines(thin)) return 10000;
   return dimension == 1 ? 300 : dimension == 2 ? 1000 : 3000;
 }
 
@@ -59,8 +60,7 @@ void refuse_inapplicable(const WeakArguments& a, ThinningMethod thin, bool rando
   const std::string with_thinning = "has no meaning with --thin " + name_of(thinnings, thin);
   refuse_if(a.nodes && thin == ThinningMethod::none, "--nodes", with_thinning);
   refuse_if(a.order && !random, "--order", with_thinning);
-  refuse_if(a.recombination_degree && thin != ThinningMethod::recombination, "--recombination-degree",
-            with_thinning);
+  refuse_if(a.recombination_degree && !recombines(thin), "--recombination-degree", with_thinning);
   refuse_if(a.seed && !random, "--seed", with_thinning + ", which draws nothing");
   refuse_if(a.launches && !random, "--launches", with_thinning + ", which draws nothing");
   refuse_if(a.gamma && a.grid != GridKind::kusuoka, "--gamma", "has meaning only with --grid kusuoka");
@@ -152,14 +152,19 @@ double kink_width(const WeakArguments& a, const WeakProblem& problem) {
   return kinks ? a.kink_width.value_or(0.4) : 0;
 }
 
-std::vector<BatchFunction> averaged_payoffs(const WeakArguments& a, const WeakProblem& problem,
-                                            double narrower) {
-  std::vector<BatchFunction> payoffs =
-      smooth_payoffs(problem.source.model(), problem.kinked, *a.horizon, problem.discount_state,
-                     kink_width(a, problem) / narrower);
-  const double factor = std::exp(-problem.discount_rate * *a.horizon);
-  for (BatchFunction& payoff : payoffs) payoff = discounted(payoff, factor);
-  return payoffs;
+std::vector<std::vector<BatchFunction>> averaged_payoffs(const WeakArguments& a, const WeakProblem& problem,
+                                                         std::size_t rungs) {
+  const double width = kink_width(a, problem), factor = std::exp(-problem.discount_rate * *a.horizon);
+  std::vector<std::vector<double>> deviations(problem.kinked.size());
+  if (width > 0)
+    deviations = kink_deviations(problem.source.model(), problem.kinked, *a.horizon, problem.discount_state);
+  std::vector<std::vector<BatchFunction>> averaged;
+  for (std::size_t k = 0; k < (width > 0 ? rungs : 1); ++k) {
+    averaged.push_back(
+        smooth_payoffs(problem.kinked, deviations, width * std::exp2(-static_cast<double>(k) / 4)));
+    for (BatchFunction& payoff : averaged.back()) payoff = discounted(payoff, factor);
+  }
+  return averaged;
 }
 
 std::vector<CubatureFormula> weak_formulas(const WeakArguments& a, const WeakProblem& problem) {
@@ -193,7 +198,6 @@ WeakRun weak_run(const WeakArguments& a, const WeakProblem& problem, CubatureFor
   if (a.tolerance) {
     refuse_if(a.steps.has_value(), "--steps", "is chosen by --tolerance: give one of them");
     refuse_if(a.richardson, "--richardson", "is part of --tolerance");
-    refuse_if(random, "--tolerance", "needs a thinning that draws nothing: recombination or none");
   } else if (!a.steps) {
     throw InputError("give the number of steps, or the error with --tolerance", "--steps");
   }
@@ -222,9 +226,10 @@ WeakRun weak_run(const WeakArguments& a, const WeakProblem& problem, CubatureFor
   return run;
 }
 
-std::size_t starting_nodes(const WeakProblem& problem) {
+std::size_t starting_nodes(const WeakProblem& problem, ThinningMethod thin) {
+  if (thin == ThinningMethod::levelwise) return 50;
   const std::size_t d = problem.source.model().reported_dimension() - (problem.discount_state ? 1 : 0);
-  return d == 1 ? 100 : 400;
+  return d == 1 ? 100 : d == 2 ? 400 : 800;
 }
 
 Json options_in_force(const WeakRun& run) {

@@ -42,9 +42,10 @@ struct WeakProblem {
 /// @throws InputError naming the option, with the column in an expression
 WeakProblem weak_problem(const WeakArguments& arguments);
 
-/// The payoffs as they are averaged, kinks smoothed over --kink-width divided by `narrower`.
-std::vector<BatchFunction> averaged_payoffs(const WeakArguments& arguments, const WeakProblem& problem,
-                                            double narrower = 1);
+/// The payoffs as they are averaged, several times: kinks smoothed over --kink-width at first and over
+/// 2^{1/4} less from rung to rung. One rung if there is nothing to smooth.
+std::vector<std::vector<BatchFunction>> averaged_payoffs(const WeakArguments& arguments,
+                                                         const WeakProblem& problem, std::size_t rungs);
 /// Standard deviations over which kinks are smoothed; 0 if there are none.
 double kink_width(const WeakArguments& arguments, const WeakProblem& problem);
 
@@ -63,7 +64,7 @@ std::vector<CubatureFormula> weak_formulas(const WeakArguments& arguments, const
 WeakRun weak_run(const WeakArguments& arguments, const WeakProblem& problem, CubatureFormula formula);
 
 /// The nodes with which --tolerance begins.
-std::size_t starting_nodes(const WeakProblem& problem);
+std::size_t starting_nodes(const WeakProblem& problem, ThinningMethod thin);
 
 /// Names and values of all options in force.
 Json options_in_force(const WeakRun& run);

@@ -4,13 +4,11 @@
 #include <cmath>
 #include <numeric>
 
-#include "wienertree/tree/recombination.hpp"
-
 namespace wienertree {
 
 std::size_t Slabs::number(std::size_t dimension, std::size_t budget) {
-  const std::size_t nodes_a_slab = 6 * moment_number(dimension, 3, budget), most = dimension == 2 ? 8 : 24;
-  return std::clamp<std::size_t>(budget / nodes_a_slab, 1, most);
+  return dimension == 2 ? std::clamp<std::size_t>(budget / 120, 1, 8)
+                        : std::clamp<std::size_t>(budget / 60, 1, 24);
 }
 
 void Slabs::thin(const Generation& sites, const std::vector<double>& value, std::size_t budget,

@@ -15,8 +15,8 @@ namespace wienertree {
 
 class Slabs {
  public:
-  /// How many slabs share N nodes in d >= 2 dimensions: as many as leave each the nodes with which
-  /// recombination keeps moments of degree 3 in several patches, but at most 8 (d = 2) or 24. Further nodes
+  /// How many slabs share N nodes in d >= 2 dimensions: at most 8, of 120 nodes or more, which keep moments
+  /// of degree 4, for d = 2; at most 24, of 60 or more, which keep some of degree 2, for d > 2. Further nodes
   /// make the patches of every slab smaller in all directions; slabs that became thinner for ever, their
   /// patches as wide across, would leave an error that does not fall with N.
   static std::size_t number(std::size_t dimension, std::size_t budget);

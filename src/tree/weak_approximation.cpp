@@ -34,7 +34,7 @@ class WeakTree {
         options_(options),
         pruned_(options.thinning.method != ThinningMethod::none),
         by_weight_alone_(pruned_ && options.thinning.order == SiteOrder::tree &&
-                         options.thinning.method != ThinningMethod::recombination),
+                         !recombines(options.thinning.method)),
         thinning_(pruned_ ? make_thinning(options.thinning) : nullptr),
         grower_(model, options.flow, options.tolerance, options.formula, options.threads) {
     // The discount state is 0 for all, and a clock the same: they are no dimensions to be thinned in.

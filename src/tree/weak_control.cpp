@@ -6,19 +6,13 @@
 #include <cmath>
 #include <map>
 
-#include "wienertree/cubature/construct.hpp"
 #include "wienertree/cubature/verification.hpp"
 #include "wienertree/tree/initial.hpp"
+#include "wienertree/tree/tree_size.hpp"
+#include "wienertree/tree/weak_levels.hpp"
 
 namespace wienertree {
 namespace {
-
-BatchFunction square_of(const BatchFunction& f) {
-  return [f](ConstBatchView x, std::span<double> out) {
-    f(x, out);
-    for (double& value : out) value *= value;
-  };
-}
 
 double largest_difference(const std::vector<double>& a, const std::vector<double>& b) {
   double largest = 0;
@@ -26,82 +20,40 @@ double largest_difference(const std::vector<double>& a, const std::vector<double
   return largest;
 }
 
-// Values by number of steps, of one formula, number of nodes and tolerance of the flow.
-class Levels {
- public:
-  Levels(const Model& model, const std::vector<BatchFunction>& payoffs, WeakRun run, std::uint64_t& solves)
-      : model_(model),
-        payoffs_(payoffs),
-        run_(std::move(run)),
-        start_(first_generation(model, run_.options.nodes)),
-        solves_(solves) {}
-
-  const WeakEstimate& tree(std::size_t n) {
-    if (const auto found = trees_.find(n); found != trees_.end()) return found->second;
-    WeakOptions options = run_.options;
-    options.grid = time_grid(run_.grid, run_.horizon, n, run_.gamma);
-    const WeakEstimate& estimate =
-        trees_.emplace(n, weak_approximation(model_, start_, payoffs_, options)).first->second;
-    solves_ += estimate.ode_solves;
-    return estimate;
-  }
-  /// X_n. @pre n even
-  std::vector<double> extrapolated(std::size_t n) {
-    std::vector<double> X = tree(n).value;
-    const std::vector<double>& coarse = tree(n / 2).value;
-    for (std::size_t i = 0; i < X.size(); ++i)
-      X[i] = extrapolate(coarse[i], X[i], n / 2, n, run_.options.formula.degree);
-    return X;
-  }
-  const WeakRun& run() const { return run_; }
-
- private:
-  const Model& model_;
-  const std::vector<BatchFunction>& payoffs_;
-  WeakRun run_;
-  Generation start_;
-  std::uint64_t& solves_;
-  std::map<std::size_t, WeakEstimate> trees_;
-};
-
 double order_of(const CubatureFormula& formula) { return (formula.degree - 1) / 2.0; }
 
 class Control {
  public:
-  Control(const Model& model, const std::vector<BatchFunction>& payoffs, std::size_t exact, WeakRun run,
+  Control(const Model& model, const std::vector<std::vector<BatchFunction>>& rungs, WeakRun run,
           const WeakTarget& target)
-      : model_(model), payoffs_(payoffs), count_(exact), run_(std::move(run)), target_(target) {}
+      : model_(model),
+        count_(rungs.front().size()),
+        rungs_(rungs.size()),
+        run_(std::move(run)),
+        target_(target),
+        random_(is_random(run_.options)) {
+    for (const auto& rung : rungs) payoffs_.insert(payoffs_.end(), rung.begin(), rung.end());
+  }
 
   ControlledResult operator()() {
     choose_formula();
-    if (target_.choose_accuracy) choose_accuracy();
-    ode_.resize(payoffs_.size(), 0.0);
-    while (!estimate(n_, run_.options.nodes)) {
-      if (largest(discretisation_) >= largest(thinning_) || !target_.choose_nodes)
-        n_ *= 2;
-      else
-        run_.options.nodes *= 2;
-      give_up_if_too_much();
-    }
+    measure_ode_error(target_.choose_accuracy ? 4 : 0);
+    run_.steps = 4;
+    // One node can only be compared with two.
+    fewer_nodes_ = run_.options.nodes > 1 ? std::max<std::size_t>(1, 2 * run_.options.nodes / 3) : 2;
+    if (!random_) run_.launches = 1;
+    if (random_ && target_.choose_launches) run_.launches = 16;
+    for (estimate(); !within(); estimate()) refine();
     return finish();
   }
 
  private:
-  Levels levels(const WeakRun& run) { return {model_, payoffs_, run, result_.ode_solves}; }
-
-  static double largest(const std::vector<double>& errors) {
-    return *std::max_element(errors.begin(), errors.end());
-  }
-
-  // Before a doubling that would cost more than is allowed.
-  void give_up_if_too_much() const {
-    const auto next = static_cast<double>(n_ * run_.options.nodes * total_segments(run_.options.formula));
-    if (static_cast<double>(result_.ode_solves) + next <= target_.most_solves) return;
-    throw RunError(fmt::format("not reached within {:.2g} ODE solves: of degree {}, what there is leaves "
-                               "errors of about {:.1e} by the steps, {:.1e} by thinning, {:.1e} by the ODEs",
-                               target_.most_solves, run_.options.formula.degree, largest(discretisation_),
-                               largest(thinning_), largest(ode_) * static_cast<double>(n_) / 2),
-                   "tolerance", fmt::format("{}", target_.tolerance));
+  // Trees of 2 steps are grown whole where they are small, so that no thinning blurs what they show.
+  WeakLevels levels_of_two_steps(WeakRun run) const {
+    const std::size_t roots = first_generation(model_, run.options.nodes).size();
+    if (unpruned_size(run.options.formula, model_, 2, roots).leaves <= 1e5)
+      run.options.thinning.method = ThinningMethod::none;
+    return {model_, payoffs_, std::move(run)};
   }
 
   // Work to reach the tolerance if the error of 2 steps, |V_2 - V_1| / (2^q - 1), falls as n^{-(q+1)} once
@@ -109,9 +61,10 @@ class Control {
   double promised_work(const CubatureFormula& formula) {
     WeakRun run = run_;
     run.options.formula = formula;
-    Levels trees = levels(run);
+    WeakLevels trees = levels_of_two_steps(run);
     const double q = order_of(formula);
-    const double error = largest_difference(trees.tree(2).value, trees.tree(1).value) / (std::exp2(q) - 1);
+    const double error = largest_difference(trees.value(2), trees.value(1)) / (std::exp2(q) - 1);
+    pilot_solves_ += trees.ode_solves();
     const double n = 2 * std::max(1.0, std::pow(error / target_.tolerance, 1 / (q + 1)));
     return n * static_cast<double>(total_segments(formula));
   }
@@ -131,143 +84,199 @@ class Control {
     run_.options.formula = *best;
   }
 
-  void choose_accuracy() {
-    for (int attempt = 0; attempt < 4; ++attempt) {
+  // Makes the flow more accurate, a hundredfold each of `attempts` times at most, until 16 steps, which are
+  // many for a formula that was chosen for its order, leave a tenth of the tolerance.
+  void measure_ode_error(int attempts) {
+    ode_.assign(payoffs_.size(), 0.0);
+    if (run_.options.flow == FlowMethod::exact) return;
+    const double steps = static_cast<double>(std::max<std::size_t>(16, run_.steps));
+    for (int attempt = 0;; ++attempt) {
       WeakRun finer = run_;
       finer.options.tolerance.relative /= 100;
       finer.options.tolerance.absolute /= 100;
-      Levels now = levels(run_), then = levels(finer);
-      ode_ = now.tree(2).value;
-      const std::vector<double>& better = then.tree(2).value;
-      for (std::size_t i = 0; i < ode_.size(); ++i) ode_[i] = std::abs(ode_[i] - better[i]);
-      // 16 steps are many for a formula that was chosen for its order.
-      if (largest(ode_) * 8 <= target_.tolerance / 10) return;
+      WeakLevels now = levels_of_two_steps(run_), then = levels_of_two_steps(finer);
+      const std::vector<double> value = now.value(2), better = then.value(2);
+      pilot_solves_ += now.ode_solves() + then.ode_solves();
+      for (std::size_t i = 0; i < ode_.size(); ++i) ode_[i] = std::abs(value[i] - better[i]);
+      if (largest_difference(value, better) * steps / 2 <= target_.tolerance / 10 || attempt >= attempts)
+        return;
       run_ = finer;
     }
   }
 
-  Levels& at_nodes(std::size_t nodes) {
-    if (const auto found = levels_.find(nodes); found != levels_.end()) return found->second;
-    WeakRun run = run_;
-    run.options.nodes = nodes;
-    return levels_.emplace(nodes, levels(run)).first->second;
+  WeakLevels& at_nodes(std::size_t nodes) {
+    auto found = levels_.find(nodes);
+    if (found == levels_.end()) {
+      WeakRun run = run_;
+      run.options.nodes = nodes;
+      found = levels_.emplace(nodes, WeakLevels(model_, payoffs_, run)).first;
+    }
+    found->second.set_launches(run_.launches);
+    return found->second;
   }
 
-  // The estimates at n steps and N nodes; whether they are within the tolerance for every payoff.
-  bool estimate(std::size_t n, std::size_t nodes) {
-    Levels& trees = at_nodes(nodes);
-    value_ = trees.extrapolated(n);
-    const std::vector<double> coarse = trees.extrapolated(n / 2);
-    const std::vector<double>&fine = trees.tree(n).value, &half = trees.tree(n / 2).value,
-          &quarter = trees.tree(n / 4).value;
-    const double expected = std::exp2(order_of(run_.options.formula));
-    discretisation_.resize(value_.size());
-    for (std::size_t i = 0; i < value_.size(); ++i) {
-      const double ratio = std::abs(half[i] - quarter[i]) / std::abs(fine[i] - half[i]);
-      const double seen = ratio > 1 ? std::min(ratio, expected) : 1;  // also if it is 0/0
-      discretisation_[i] = std::abs(value_[i] - coarse[i]) / (2 * seen - 1);
+  // The first payoff of the rung that is taken.
+  std::size_t first_of_rung(const std::vector<double>& X) const {
+    for (std::size_t rung = 0; rung + 2 < rungs_; ++rung) {
+      double change = 0;
+      for (std::size_t i = rung * count_; i < (rung + 1) * count_; ++i)
+        change = std::max(change, std::abs(X[i] - X[i + count_]));
+      if (change <= target_.tolerance / 4) return rung * count_;
     }
-    result_.leaves = trees.tree(n).leaves;
-    thinning_.assign(value_.size(), 0.0);
-    if (run_.options.thinning.method != ThinningMethod::none) {
-      const std::vector<double> fewer = at_nodes(std::max<std::size_t>(1, nodes / 2)).extrapolated(n / 2);
-      for (std::size_t i = 0; i < value_.size(); ++i) thinning_[i] = std::abs(coarse[i] - fewer[i]);
+    return rungs_ > 1 ? (rungs_ - 2) * count_ : 0;
+  }
+
+  void estimate() {
+    const std::size_t n = run_.steps, N = run_.options.nodes;
+    WeakLevels& trees = at_nodes(N);
+    const std::vector<double> X = trees.extrapolated(n), X_half = trees.extrapolated(n / 2),
+                              X_quarter = trees.extrapolated(n / 4), V = trees.value(n),
+                              V_half = trees.value(n / 2), V_quarter = trees.value(n / 4),
+                              deviation = trees.standard_error(n);
+    const double gain = std::exp2(order_of(run_.options.formula));
+    const std::size_t first = first_of_rung(X);
+    result_.value.assign(count_, 0.0);
+    result_.standard_error.assign(count_, 0.0);
+    result_.error.assign(count_, {});
+    for (std::size_t k = 0; k < count_; ++k) {
+      const std::size_t i = first + k;
+      const double step = std::abs(V[i] - V_half[i]);
+      const double rho = step > 0 ? std::max(1.25, std::abs(V_half[i] - V_quarter[i]) / step) : gain;
+      WeakErrorSplit& error = result_.error[k];
+      error.discretisation =
+          std::max({std::abs(X[i] - X_half[i]), std::abs(X_half[i] - X_quarter[i]) / (4 * gain),
+                    step * std::abs(1 / (rho - 1) - 1 / (gain - 1))});
+      if (rungs_ > 1) error.discretisation += std::abs(X[i] - X[i + count_]) * 4 / 3;
+      error.ode = ode_[i] * static_cast<double>(n) / 2;
+      error.sampling = 2 * deviation[i];
+      result_.value[k] = X[i];
+      result_.standard_error[k] = deviation[i];
     }
-    for (std::size_t i = 0; i < count_; ++i)
-      if (!(discretisation_[i] + thinning_[i] + ode_[i] * static_cast<double>(n) / 2 <= target_.tolerance))
-        return false;
-    return true;
+    result_.leaves = trees.leaves(n);
+    if (random_ || run_.options.thinning.method == ThinningMethod::none) return;
+    WeakLevels& other = at_nodes(fewer_nodes_);
+    const std::vector<double> Y = other.extrapolated(n), Y_half = other.extrapolated(n / 2);
+    for (std::size_t k = 0; k < count_; ++k) {
+      const std::size_t i = first + k;
+      result_.error[k].thinning = std::max(std::abs(X[i] - Y[i]), std::abs(X_half[i] - Y_half[i]));
+    }
+  }
+
+  bool within() const {
+    return std::all_of(result_.error.begin(), result_.error.end(),
+                       [&](const WeakErrorSplit& e) { return e.total() <= target_.tolerance; });
+  }
+
+  double largest(double WeakErrorSplit::*part) const {
+    double most = 0;
+    for (const WeakErrorSplit& e : result_.error) most = std::max(most, e.*part);
+    return most;
+  }
+
+  void refine() {
+    const double steps = largest(&WeakErrorSplit::discretisation),
+                 thinning = largest(&WeakErrorSplit::thinning), ode = largest(&WeakErrorSplit::ode),
+                 sampling = largest(&WeakErrorSplit::sampling), e = target_.tolerance;
+    if (ode > e / 2 && target_.choose_accuracy && !ode_tightened_) {
+      // More steps than were foreseen.
+      pilot_solves_ = solves();
+      levels_.clear();
+      measure_ode_error(2);
+      ode_tightened_ = true;
+      return;
+    }
+    if (ode > e) give_up("that of the ODEs grows with the steps: take a smaller --rtol and --atol");
+    if (thinning > e && !target_.choose_nodes) give_up("that of thinning needs more --nodes");
+    // Noise may make up 4 of its own size of what the steps seem to leave.
+    if (random_ && sampling >= steps / 4) return sample_more(sampling);
+    // The same for thinning.
+    if (thinning > steps / 2 && target_.choose_nodes) return add_nodes();
+    if (run_.options.thinning.method == ThinningMethod::none) refuse_whole_tree(2 * run_.steps);
+    allow(2);
+    run_.steps *= 2;
+  }
+
+  void sample_more(double sampling) {
+    if (target_.choose_launches) {
+      const double factor = std::clamp(std::ceil(std::pow(2 * sampling / target_.tolerance, 2)), 2.0, 16.0);
+      allow(factor * 7 / 4);
+      run_.launches *= static_cast<std::uint32_t>(factor);
+      return;
+    }
+    if (!target_.choose_nodes) give_up("that of sampling needs more --nodes or --launches");
+    add_nodes();
+  }
+
+  // By half; the trees there are become those to compare with.
+  void add_nodes() {
+    allow(1.5 * 7 / 4);  // trees of n, n/2 and n/4 steps
+    fewer_nodes_ = run_.options.nodes;
+    run_.options.nodes += std::max<std::size_t>(1, run_.options.nodes / 2);
+  }
+
+  std::uint64_t solves() const {
+    std::uint64_t sum = pilot_solves_;
+    for (const auto& [nodes, trees] : levels_) sum += trees.ode_solves();
+    return sum;
+  }
+
+  // Before work of `factor` times the largest tree, all launches of it.
+  void allow(double factor) {
+    const auto finest = static_cast<double>(at_nodes(run_.options.nodes).ode_solves(run_.steps));
+    if (static_cast<double>(solves()) + factor * finest > target_.most_solves)
+      give_up(fmt::format("more would take over {:.2g} ODE solves", target_.most_solves));
+  }
+
+  void refuse_whole_tree(std::size_t steps) const {
+    const std::size_t roots = first_generation(model_, run_.options.nodes).size();
+    const UnprunedSize size = unpruned_size(run_.options.formula, model_, steps, roots);
+    if (size.bytes <= run_.options.memory_limit) return;
+    give_up(
+        fmt::format("a whole tree of {} steps has {:.3g} leaves and needs about {:.3g} GB, over the "
+                    "limit of {:.3g} GB: thin it (--thin recombination)",
+                    steps, size.leaves, size.bytes / 1e9, run_.options.memory_limit / 1e9));
+  }
+
+  [[noreturn]] void give_up(const std::string& reason) const {
+    throw RunError(
+        fmt::format("not reached by degree {} in {} steps: errors of about {:.1e} by the steps, {:.1e} by "
+                    "thinning, {:.1e} by sampling, {:.1e} by the ODEs; {}",
+                    run_.options.formula.degree, run_.steps, largest(&WeakErrorSplit::discretisation),
+                    largest(&WeakErrorSplit::thinning), largest(&WeakErrorSplit::sampling),
+                    largest(&WeakErrorSplit::ode), reason),
+        "tolerance", fmt::format("{}", target_.tolerance));
   }
 
   ControlledResult finish() {
-    run_.steps = n_;
     run_.richardson = true;
     result_.run = run_;
-    for (std::size_t i = 0; i < count_; ++i) {
-      WeakErrorSplit& error = result_.error.emplace_back();
-      result_.value.push_back(value_[i]);
-      error.discretisation = discretisation_[i];
-      if (value_.size() > count_) error.discretisation += std::abs(value_[i] - value_[count_ + i]);
-      error.thinning = thinning_[i];
-      error.ode = ode_[i] * static_cast<double>(n_) / 2;
-    }
+    result_.ode_solves = solves();
     return std::move(result_);
   }
 
   const Model& model_;
-  const std::vector<BatchFunction>& payoffs_;
-  std::size_t count_;
+  std::size_t count_, rungs_;
+  std::vector<BatchFunction> payoffs_;  ///< rung by rung
   WeakRun run_;
   const WeakTarget& target_;
+  bool random_, ode_tightened_ = false;
   ControlledResult result_;
-  std::vector<double> value_, discretisation_, thinning_, ode_;
-  std::size_t n_ = 4;
-  std::map<std::size_t, Levels> levels_;  // by number of nodes
+  std::vector<double> ode_;  ///< at 2 steps, one for each of payoffs_
+  std::uint64_t pilot_solves_ = 0;
+  std::size_t fewer_nodes_ = 1;
+  std::map<std::size_t, WeakLevels> levels_;  ///< by number of nodes
 };
 
 }  // namespace
 
-std::vector<BatchFunction> smooth_payoffs(const Model& model, const std::vector<KinkedFunction>& payoffs,
-                                          double horizon, std::optional<std::size_t> discount_state,
-                                          double width) {
-  std::vector<BatchFunction> arguments = {
-      [](ConstBatchView, std::span<double> out) { std::fill(out.begin(), out.end(), 1.0); }};
-  for (const KinkedFunction& payoff : payoffs)
-    for (const BatchFunction& kink : payoff.kinks) arguments.insert(arguments.end(), {kink, square_of(kink)});
-  std::vector<BatchFunction> result;
-  if (arguments.size() == 1 || width == 0) {
-    for (const KinkedFunction& payoff : payoffs) result.push_back(payoff.exact);
-    return result;
-  }
-  WeakRun pilot;
-  pilot.options.formula = construct_degree_3(static_cast<int>(model.noise_dimension()));
-  pilot.options.nodes = 200;
-  pilot.options.discount_state = discount_state;
-  pilot.options.tolerance = {1e-5, 1e-7};
-  pilot.horizon = horizon;
-  pilot.steps = 8;
-  const std::vector<double> moments = run_weak(model, arguments, pilot).value;
-  const double mass = moments[0];  // below 1 where payoffs are discounted
-  std::size_t at = 1;
-  for (const KinkedFunction& payoff : payoffs) {
-    std::vector<double> widths;
-    for (std::size_t k = 0; k < payoff.kinks.size(); ++k, at += 2) {
-      const double mean = moments[at] / mass, square = moments[at + 1] / mass;
-      const double variance = square - mean * mean;
-      // A kink whose argument does not vary lies to one side of it, or at its only value: it stays sharp.
-      const bool varies = variance > 1e-12 * square;
-      widths.push_back(width * (varies ? std::sqrt(variance) : 1e-6 * (std::abs(mean) + 1e-6)));
-    }
-    result.push_back(payoff.kinks.empty() ? payoff.exact : payoff.smoothed(widths));
-  }
-  return result;
-}
-
-ControlledResult weak_to_tolerance(const Model& model, const PayoffsByWidth& payoffs, const WeakRun& run,
-                                   const WeakTarget& target) {
+ControlledResult weak_to_tolerance(const Model& model, const std::vector<std::vector<BatchFunction>>& rungs,
+                                   const WeakRun& run, const WeakTarget& target) {
   if (!(target.tolerance > 0) || !std::isfinite(target.tolerance))
     throw InputError("must be positive", "tolerance", fmt::format("{}", target.tolerance));
   if (target.formulas.empty()) throw InputError("needs a formula", "tolerance");
-  if (is_random(run.options))
-    throw InputError("needs a thinning that draws nothing: recombination or none", "tolerance");
-  WeakRun pilot = run;
-  pilot.options.formula = target.formulas.front();
-  pilot.steps = 4;
-  // Kinks smoothed over 2^{1/4} less show what smoothing does: its error falls by 2^3, while the coarseness
-  // of the tree shows hardly more.
-  double narrower = 1;
-  for (int attempt = 0;; ++attempt, narrower *= 1.25) {
-    std::vector<BatchFunction> all = payoffs(narrower);
-    const std::size_t count = all.size();
-    const std::vector<BatchFunction> smoother = payoffs(narrower * std::pow(2.0, 0.25));
-    all.insert(all.end(), smoother.begin(), smoother.end());
-    const std::vector<double> value = run_weak(model, all, pilot).value;
-    double smoothing = 0;
-    for (std::size_t i = 0; i < count; ++i)
-      smoothing = std::max(smoothing, std::abs(value[i] - value[count + i]));
-    // After 8 attempts a sixth of the width: what is seen then is the tree's own coarseness.
-    if (smoothing <= target.tolerance / 4 || attempt == 8) return Control(model, all, count, run, target)();
-  }
+  if (rungs.empty() || rungs.front().empty()) throw InputError("needs a payoff", "tolerance");
+  if (run.launches == 0) throw InputError("must be at least 1", "launches", "0");
+  return Control(model, rungs, run, target)();
 }
 
 }  // namespace wienertree

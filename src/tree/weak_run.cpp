@@ -34,8 +34,7 @@ void split(const std::vector<Mean>& means, std::vector<double>& value, std::vect
 }  // namespace
 
 bool is_random(const WeakOptions& options) {
-  return options.thinning.method != ThinningMethod::none &&
-         options.thinning.method != ThinningMethod::recombination;
+  return options.thinning.method != ThinningMethod::none && !recombines(options.thinning.method);
 }
 
 double extrapolate(double coarse, double fine, std::size_t k, std::size_t n, int degree) {

@@ -99,6 +99,65 @@ TEST_CASE("weak: a tolerance chooses the steps, and the error is told part by pa
         value_of(place, "gbm --horizon 1 --steps 8 --payoff max(s-100,0) --kink-width 0"));
 }
 
+TEST_CASE("weak: a tolerance with a sampled tree chooses the launches") {
+  const Workplace place;
+  const std::string command = "heston --horizon 1 --payoff max(s-1.05,0) --tolerance 2e-3 ";
+  for (const std::string thin : {"tbba --nodes 300", "systematic --order tree --nodes 3000"}) {
+    const auto row = rows_of(place, command + "--thin " + thin)[0];
+    CHECK(row["error_sampling"].get<double>() > 0);
+    CHECK(row["error_sampling"].get<double>() == Approx(2 * row["standard_error"].get<double>()));
+    CHECK(row["error_thinning"] == 0);
+    CHECK(row["error"].get<double>() <= 2e-3);
+    // Heston (1993). H0: normal about a value within the estimate of what is not drawn: 4e-8 beyond 5.5 SE.
+    CHECK(std::abs(row["value"].get<double>() - 0.125741987887) <
+          row["error_discretisation"].get<double>() + 5.5 * row["standard_error"].get<double>());
+  }
+  // Given launches stay, and nodes are added.
+  const Outcome outcome = place.run(
+      "weak heston --horizon 1 --payoff max(s-1.05,0) --tolerance 3e-3 --thin tbba --launches 8 --format "
+      "json");
+  REQUIRE(outcome.code == 0);
+  CHECK(nlohmann::json::parse(outcome.out)["options"]["launches"] == 8);
+}
+
+TEST_CASE("weak: every thinning agrees with the whole tree") {
+  const Workplace place;
+  const std::string command = "heston --horizon 1 --steps 4 --payoff s*s --payoff v*s ";
+  const auto values = [&](const std::string& options) {
+    std::vector<double> all;
+    for (const auto& row : rows_of(place, command + options)) {
+      all.push_back(row["value"]);
+      CHECK(row["standard_error"] == 0);
+    }
+    return all;
+  };
+  const std::vector<double> whole = values("--thin none");
+  for (const std::string thin : {"recombination", "levelwise", "heavy-first"}) {
+    INFO(thin);
+    for (const std::string more : {"--nodes 200", "--nodes 100 --recombination-degree 4"}) {
+      const std::vector<double> thinned = values("--thin " + thin + " " + more);
+      for (std::size_t i = 0; i < whole.size(); ++i) CHECK(thinned[i] == Approx(whole[i]).epsilon(1e-5));
+    }
+  }
+}
+
+TEST_CASE("weak: a tolerance that cannot be reached is one line, exit code 1, with what would help") {
+  const Workplace place;
+  const std::string heston = "weak heston --horizon 1 --payoff max(s-1,0) ";
+  for (const auto& [options, part] : std::vector<std::pair<std::string, std::string>>{
+           {"--tolerance 1e-7 --nodes 20", "needs more --nodes"},
+           {"--tolerance 1e-9 --thin none", "--thin recombination"},
+           {"--tolerance 1e-6 --thin tbba --nodes 10 --launches 2", "more --nodes or --launches"},
+           {"--tolerance 1e-9 --rtol 1e-2 --atol 1e-2 --degree 5", "smaller --rtol"}}) {
+    const Outcome outcome = place.run(heston + options);
+    INFO(options << "\n" << outcome.err);
+    CHECK(outcome.code == 1);
+    CHECK(cli::lines_of(outcome.err).size() == 1);
+    CHECK_THAT(outcome.err, Catch::StartsWith("wienertree: ") && Catch::Contains(part));
+    CHECK(outcome.out.empty());
+  }
+}
+
 TEST_CASE("weak: formulas of Lie polynomials") {
   const Workplace place;
   REQUIRE(place.run("formulas construct --degree 5 --dimension 2 --lie --output lie.json").code == 0);
@@ -136,7 +195,9 @@ TEST_CASE("weak: what is wrong is one line and exit code 2") {
       {"weak heston --horizon 1 --steps 12 --payoff s --thin none", "--thin recombination"},
       {gbm + "--payoff s --nodes 900000000", "--nodes"},
       {gbm + "--payoff s --tolerance 1e-3", "--steps"},
-      {"weak gbm --horizon 1 --payoff s --tolerance 1e-3 --thin tbba", "draws nothing"},
+      {gbm + "--payoff s --thin levelwise --seed 3", "draws nothing"},
+      {gbm + "--payoff s --thin heavy-first --order tree", "--order"},
+      {"weak gbm --horizon 1 --payoff s --tolerance 1e-3 --launches 4", "draws nothing"},
       {gbm + "--payoff s --kink-width -1", "must not be negative"},
       {"weak gmb --horizon 1 --steps 4 --payoff s", "gbm"},
   };
