@@ -146,8 +146,8 @@ TEST_CASE("weak: a tolerance that cannot be reached is one line, exit code 1, wi
   const std::string heston = "weak heston --horizon 1 --payoff max(s-1,0) ";
   for (const auto& [options, part] : std::vector<std::pair<std::string, std::string>>{
            {"--tolerance 1e-7 --nodes 20", "needs more --nodes"},
-           {"--tolerance 1e-9 --thin none", "--thin recombination"},
-           {"--tolerance 1e-6 --thin tbba --nodes 10 --launches 2", "more --nodes or --launches"},
+           {"--tolerance 1e-9 --thin none --degree 7", "--thin recombination"},
+           {"--tolerance 1e-4 --thin tbba --nodes 30 --launches 3", "more --nodes or --launches"},
            {"--tolerance 1e-9 --rtol 1e-2 --atol 1e-2 --degree 5", "smaller --rtol"}}) {
     const Outcome outcome = place.run(heston + options);
     INFO(options << "\n" << outcome.err);

@@ -82,7 +82,7 @@ template <class Driven>
 std::vector<double> linear_errors(int p, const Driven& driven) {
   std::mt19937_64 engine(2);
   std::vector<double> squares(3, 0.0);
-  constexpr int draws = full ? 6 : 3;
+  constexpr int draws = full ? 6 : 2;
   for (int draw = 0; draw < draws; ++draw) {
     const std::vector<Matrix> A = random_fields(p, engine);
     Matrix generator = A[0];
@@ -212,7 +212,7 @@ TEST_CASE("Heston beyond Feller's condition: the order in v and in its root") {
     WeakRun run;
     for (const CatalogueEntry& entry : bundled_formulas(formulas))
       if (entry.formula.name == formula) run.options.formula = entry.formula;
-    run.options.nodes = 1600;
+    run.options.nodes = full ? 1600 : 800;
     run.options.finest_along = f.kinks.front();
     for (const std::size_t n : {8, 16, 32}) {
       run.steps = n;
@@ -285,7 +285,7 @@ TEST_CASE("three states whose fields do not commute, against the limit of a high
       "\"0.5*cos(y)\"]\n",
       "bent");
   const BatchFunction f = text.compile("sin(x) + x*y + cos(z)*y", "payoff");
-  // Whole trees, so that the order is that of the steps alone: 24^4 leaves at degree 7, 92^3 for the limit.
+  // Whole trees, so that the order is that of the steps alone: 24^4 leaves at degree 7.
   const auto value = [&](int degree, std::size_t n, bool richardson) {
     WeakRun run;
     run.options.formula = find_formula(degree, 2, formulas);
@@ -297,7 +297,9 @@ TEST_CASE("three states whose fields do not commute, against the limit of a high
     const WeakResult result = run_weak(text.model(), {f}, run);
     return richardson ? result.extrapolated[0] : result.value[0];
   };
-  const double limit = value(9, 3, true);
+  // 92^3 leaves and 92^2: the full program computes it again.
+  constexpr double limit = -0.0846725679;
+  if (full) CHECK(value(9, 3, true) == Approx(limit).epsilon(0).margin(1e-9));
   for (const auto& [degree, least] : {std::pair{5, 1.85}, std::pair{7, 2.8}}) {
     std::vector<double> steps, errors;
     fmt::print("three states, degree {}:", degree);
