@@ -153,6 +153,18 @@ void add_assignments(CLI::App& app, Assignments& target) {
       ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
 }
 
+void set_option(CLI::App& app, const std::string& name, const std::vector<std::string>& values) {
+  CLI::Option* option = app.get_option_no_throw(name);
+  if (option == nullptr)
+    throw InputError("unknown option" + text::suggestion(name, option_names(app)), app.get_name(), name);
+  for (const std::string& value : values) option->add_result(value);
+  try {
+    option->run_callback();
+  } catch (const CLI::ParseError& error) {
+    throw InputError(error.what(), name);
+  }
+}
+
 int run_program(CLI::App& app, int argc, char** argv) {
   try {
     try {

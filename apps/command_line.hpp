@@ -75,6 +75,10 @@ using Assignments = std::vector<std::pair<std::string, double>>;
 std::pair<std::string, double> parse_assignment(const std::string& text, const std::string& option);
 void add_assignments(CLI::App& app, Assignments& target);
 
+/// Gives an option of `app` its values outside of any command line: every value is parsed as its text.
+/// @throws InputError for an unknown option, with the nearest known one, and as the option does when parsed
+void set_option(CLI::App& app, const std::string& name, const std::vector<std::string>& values);
+
 /// Parses and runs; what a subcommand does is done by its callback. Never throws: errors become one line on
 /// standard error.
 /// @returns the exit code: 0 done, 1 the run failed, 2 wrong usage or bad input

@@ -173,8 +173,7 @@ void add_compare_command(CLI::App& program) {
                  "Bundled models or TOML files; MODEL:NAME=VALUE,.. sets parameters of this one")
       ->required();
   add_text(app, "--observations", a->observations, "FILE", "CSV with header t,y1,..")->required();
-  add_count(app, "--steps", a->steps, 1, "Steps [one a row, but at most 200 of a continuous record]",
-            1'000'000'000);
+  add_record_steps(app, a->steps);
   add_filter_options(app, a->filter);
   add_assignments(app, a->parameters);
   add_text(app, "--output", a->output, "FILE", "Where the table goes [standard output]");

@@ -182,6 +182,15 @@ void add_filter_options(CLI::App& app, FilterArguments& a) {
   add_count(app, "--launches", a.launches, 1, "Independent runs of a random method, averaged [1]", 1'000'000);
 }
 
+void add_record_steps(CLI::App& app, std::optional<std::uint64_t>& steps) {
+  add_count(app, "--steps", steps, 1, "Steps [one a row, but at most 200 of a continuous record]",
+            1'000'000'000);
+}
+
+void add_moments(CLI::App& app, std::optional<std::uint64_t>& moments) {
+  add_count(app, "--moments", moments, 2, "Also the raw moments E[x^2] .. E[x^K]", 20);
+}
+
 std::optional<FilterMethod> exact_method(const Model& model) {
   switch (model.exact_filter) {
     case ExactFilter::none:

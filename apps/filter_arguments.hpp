@@ -29,6 +29,10 @@ void add_tree_options(CLI::App& app, FilterArguments& arguments);
 /// Those, and the ones of other filters.
 void add_filter_options(CLI::App& app, FilterArguments& arguments);
 
+/// Into how many steps a record is cut, and the moments that are reported.
+void add_record_steps(CLI::App& app, std::optional<std::uint64_t>& steps);
+void add_moments(CLI::App& app, std::optional<std::uint64_t>& moments);
+
 /// What will be run.
 struct FilterSetup {
   FilterOptions options;

@@ -135,13 +135,12 @@ void add_filter_command(CLI::App& program) {
   add_text(app, "--observations", a->observations, "FILE",
            "CSV with header t,y1,..; - is standard input, row by row")
       ->required();
-  add_count(app, "--steps", a->steps, 1, "Steps [one a row, but at most 200 of a continuous record]",
-            1'000'000'000);
+  add_record_steps(app, a->steps);
   add_filter_options(app, a->filter);
   add_assignments(app, a->parameters);
   add_text(app, "--output", a->output, "FILE", "Where the table goes [standard output]");
   add_choice(app, "--format", a->format, formats, "Of the table [csv]");
-  add_count(app, "--moments", a->moments, 2, "Also the raw moments E[x^2] .. E[x^K]", 20);
+  add_moments(app, a->moments);
   add_text(app, "--plot", a->plot, "FILE", "A picture of mean and 5-95 % band, .svg or .png");
   add_number(app, "--density-at", a->density_at, Sign::any, "Draw the law at this time instead");
   add_text(app, "--signal", a->signal, "FILE", "The true signal (CSV t,<state>,..), to be drawn as well");

@@ -1,10 +1,11 @@
 #include "filter_report.hpp"
-#include "wienertree/version.hpp"
 
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <span>
+
+#include "wienertree/version.hpp"
 
 namespace wienertree::app {
 namespace {

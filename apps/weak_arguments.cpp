@@ -112,7 +112,10 @@ void add_weak_options(CLI::App& app, WeakArguments& a) {
 }
 
 WeakProblem weak_problem(const WeakArguments& a) {
-  const TextModel model = TextModel::load(model_file(a.model).string(), a.parameters);
+  return weak_problem(a, TextModel::load(model_file(a.model).string(), a.parameters));
+}
+
+WeakProblem weak_problem(const WeakArguments& a, const TextModel& model) {
   if (a.kink_width && *a.kink_width < 0)
     throw InputError("must not be negative", "--kink-width", fmt::format("{}", *a.kink_width));
   if (a.payoffs.empty()) throw InputError("is needed at least once", "--payoff");

@@ -41,6 +41,8 @@ struct WeakProblem {
 
 /// @throws InputError naming the option, with the column in an expression
 WeakProblem weak_problem(const WeakArguments& arguments);
+/// Of a model that is at hand, whatever `arguments.model` says.
+WeakProblem weak_problem(const WeakArguments& arguments, const TextModel& model);
 
 /// The payoffs as they are averaged, several times: kinks smoothed over --kink-width at first and over
 /// 2^{1/4} less from rung to rung. One rung if there is nothing to smooth.

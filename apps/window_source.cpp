@@ -11,10 +11,13 @@ namespace {
 
 class RecordedWindows final : public WindowSource {
  public:
-  RecordedWindows(ObservationPath path, const Model& model, std::optional<std::size_t> steps)
-      : path_(std::move(path)),
-        windows_(path_, model.observation, model.timing, steps.value_or(default_steps(model.observation))),
-        inner_rows_(model.observation == ObservationKind::continuous && windows_.size() < path_.rows() - 1) {}
+  RecordedWindows(ObservationRows rows, const Model& model, std::optional<std::size_t> steps,
+                  std::unique_ptr<const ObservationPath> owned = nullptr)
+      : owned_(std::move(owned)),
+        rows_(rows),
+        windows_(rows_, model.observation, model.timing,
+                 steps.value_or(default_steps(rows_, model.observation))),
+        inner_rows_(model.observation == ObservationKind::continuous && windows_.size() < rows_.rows() - 1) {}
 
   bool next(ObservationWindow& window) override {
     if (done_ == windows_.size()) return false;
@@ -27,20 +30,13 @@ class RecordedWindows final : public WindowSource {
   }
   std::optional<double> end() const override { return windows_.end(); }
   std::size_t size() const override { return windows_.size(); }
-  std::size_t rows() const override { return path_.rows(); }
+  std::size_t rows() const override { return rows_.rows(); }
   bool has_inner_rows() const override { return inner_rows_; }
   bool streams() const override { return false; }
 
  private:
-  // Continuous: a step a row, or fewer where rows abound. Discrete: a step a row, or several where rows are
-  // few.
-  std::size_t default_steps(ObservationKind kind) const {
-    const std::size_t gaps = path_.rows() - 1;
-    if (kind == ObservationKind::continuous) return std::min(gaps, usual_steps);
-    return gaps * std::max<std::size_t>(1, gaps == 0 ? 1 : (usual_steps + gaps / 2) / gaps);
-  }
-
-  ObservationPath path_;
+  std::unique_ptr<const ObservationPath> owned_;
+  ObservationRows rows_;
   ObservationWindows windows_;
   bool inner_rows_;
   std::size_t done_ = 0;
@@ -108,15 +104,31 @@ class StreamedWindows final : public WindowSource {
 
 }  // namespace
 
+// Continuous: a step a row, or fewer where rows abound. Discrete: a step a row, or several where rows are
+// few.
+std::size_t default_steps(const ObservationRows& rows, ObservationKind kind) {
+  const std::size_t gaps = rows.rows() - 1;
+  if (kind == ObservationKind::continuous) return std::min(gaps, usual_steps);
+  return gaps * std::max<std::size_t>(1, gaps == 0 ? 1 : (usual_steps + gaps / 2) / gaps);
+}
+
 std::unique_ptr<WindowSource> open_windows(const std::string& observations, const Model& model,
                                            std::optional<std::size_t> steps) {
-  if (observations != "-")
-    return std::make_unique<RecordedWindows>(
-        read_observations(observations, model.observation_dimension(), model.observation), model, steps);
+  if (observations != "-") {
+    auto path = std::make_unique<const ObservationPath>(
+        read_observations(observations, model.observation_dimension(), model.observation));
+    const ObservationRows rows = *path;
+    return std::make_unique<RecordedWindows>(rows, model, steps, std::move(path));
+  }
   if (steps)
     throw InputError("needs the whole record; with --observations - every row ends a step", "--steps",
                      std::to_string(*steps));
   return std::make_unique<StreamedWindows>(model);
+}
+
+std::unique_ptr<WindowSource> cut_windows(ObservationRows rows, const Model& model,
+                                          std::optional<std::size_t> steps) {
+  return std::make_unique<RecordedWindows>(rows, model, steps);
 }
 
 }  // namespace wienertree::app

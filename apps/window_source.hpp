@@ -32,7 +32,14 @@ class WindowSource {
 /// `steps`: at least `usual_steps` where the rows allow it, no more than needed for one a row.
 /// @throws InputError for a file that cannot be read, steps that do not fit it, or steps with standard input
 inline constexpr std::size_t usual_steps = 200;
+/// The steps of a record for which none are given.
+std::size_t default_steps(const ObservationRows& rows, ObservationKind kind);
 std::unique_ptr<WindowSource> open_windows(const std::string& observations, const Model& model,
                                            std::optional<std::size_t> steps);
+
+/// A record in memory, which must outlive what is returned, cut in the same way.
+/// @throws InputError for steps that do not fit it
+std::unique_ptr<WindowSource> cut_windows(ObservationRows rows, const Model& model,
+                                          std::optional<std::size_t> steps);
 
 }  // namespace wienertree::app

@@ -16,7 +16,7 @@ constexpr std::size_t block = 1024;  // particles whose arrays stay in cache; ev
 EulerFilter::EulerFilter(const Model& model, const FilterOptions& options)
     : model_(model),
       options_(options),
-      functional_(make_functional(options.functional)),
+      functional_(make_functional(options)),
       thinning_(options.thinning.method == ThinningMethod::none ? nullptr : make_thinning(options.thinning)),
       pool_(options.threads),
       scratch_(pool_.size()),

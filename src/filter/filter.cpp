@@ -66,6 +66,10 @@ void check_mixture_options(const FilterOptions& options) {
 
 }  // namespace
 
+std::unique_ptr<Functional> make_functional(const FilterOptions& options) {
+  return options.own_functional ? options.own_functional() : make_functional(options.functional);
+}
+
 std::unique_ptr<Filter> make_filter(const Model& model, const FilterOptions& options) {
   check(model);
   switch (options.method) {

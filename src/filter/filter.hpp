@@ -87,6 +87,8 @@ struct FilterOptions {
   ThinningOptions thinning;
   PruneWeights prune_weights = PruneWeights::likelihood;
   FunctionalMethod functional = FunctionalMethod::second_order;
+  /// A likelihood of the caller's in place of `functional`; made once for each filter.
+  std::function<std::unique_ptr<Functional>()> own_functional = {};
   /// Random thinning lets likelihoods decide when their effective sample size is at most this fraction F of
   /// what it is when all are equal. Euler: particles are resampled then, and not before. Tree: children are
   /// always thinned to N, before by cubature weights alone, the likelihoods carried; F = 1 lets them decide
@@ -107,6 +109,8 @@ struct FilterOptions {
   std::size_t grid_points = 400;
   double grid_step = 0.25;
 };
+
+std::unique_ptr<Functional> make_functional(const FilterOptions& options);
 
 /// The model is copied (its fields are shared). @throws InputError if an option does not fit the model or
 /// another option

@@ -22,7 +22,7 @@ GaussianMixtureFilter::GaussianMixtureFilter(const Model& model, const FilterOpt
     : model_(model),
       options_(options),
       alpha_(mixture_alpha(options)),
-      functional_(make_functional(options.functional)),
+      functional_(make_functional(options)),
       thinning_(make_thinning(options.thinning)),
       rule_(rule_of_one_gaussian(static_cast<int>(model.state_dimension()))),
       pool_(options.threads),

@@ -21,7 +21,7 @@ constexpr std::size_t block = 1024;  ///< nodes a task: their sensor values stay
 KlvFilter::KlvFilter(const Model& model, const FilterOptions& options)
     : model_(model),
       options_(options),
-      functional_(make_functional(options.functional)),
+      functional_(make_functional(options)),
       thinning_(options.thinning.method == ThinningMethod::none ? nullptr : make_thinning(options.thinning)),
       grower_(model_, options_.flow, options_.tolerance, options_.formula, options_.threads),
       survivors_(first_generation(model_, options_.nodes)),

@@ -132,8 +132,15 @@ Marginal::Marginal(const Posterior& posterior, std::size_t i)
       families.push_back({weight_[n], atoms_[n], posterior.variance_of(i, n)});
   }
   if (families.size() > most_gaussians) merge(families);
-  for (const Family& f : families)
-    if (f.weight > 0) gaussians_.push_back({f.weight, f.mean, std::sqrt(f.variance)});
+  // A family that an observation leaves one child is a point. Far out in the law, points of no mass are no
+  // obstacle to a density: 1e-12 is that of rounding.
+  double points = 0;
+  for (const Family& f : families) {
+    if (!(f.weight > 0)) continue;
+    gaussians_.push_back({f.weight, f.mean, std::sqrt(f.variance)});
+    if (!(f.variance > 0)) points += f.weight;
+  }
+  has_density_ = !gaussians_.empty() && points < 1e-12;
 }
 
 // Mean and variance of each family, relative to its first child so that nothing cancels.
@@ -190,6 +197,7 @@ double Marginal::density(double x) const {
   assert(has_density());
   double sum = 0;
   for (const Gaussian& g : gaussians_) {
+    if (!(g.sd > 0)) continue;
     const double z = (x - g.mean) / g.sd;
     sum += g.weight * std::exp(-z * z / 2) / g.sd;
   }

@@ -24,7 +24,7 @@ class Marginal {
   double distribution(double x) const;  ///< P(X_i <= x)
   /// @pre has_density()
   double density(double x) const;
-  bool has_density() const { return !gaussians_.empty() && gaussians_.front().sd > 0; }
+  bool has_density() const { return has_density_; }
   /// For ascending `levels` in (0,1).
   void quantiles(std::span<const double> levels, std::span<double> out) const;
 
@@ -39,6 +39,7 @@ class Marginal {
   static void merge(std::vector<Family>& families);
   double gaussian_quantile(double level) const;
 
+  bool has_density_ = false;
   std::vector<Gaussian> gaussians_;         ///< empty for Dirac masses
   std::span<const double> atoms_, weight_;  ///< Dirac masses
 };

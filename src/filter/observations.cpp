@@ -37,6 +37,12 @@ std::string shown(std::string_view text) {
 
 std::string column_name(std::size_t column) { return column == 0 ? "t" : fmt::format("y{}", column); }
 
+void require_rows(std::size_t rows, const std::string& origin, ObservationKind kind) {
+  if (rows == 0) throw InputError("there are no rows", origin);
+  if (kind == ObservationKind::continuous && rows < 2)
+    throw InputError("a continuous observation needs at least two rows: its start and one more", origin);
+}
+
 }  // namespace
 
 void ObservationPath::append(double time, std::span<const double> value) {
@@ -104,6 +110,27 @@ bool ObservationReader::next(double& t, std::span<double> y) {
   return true;
 }
 
+void check_observations(const ObservationRows& rows, const std::string& origin, ObservationKind kind) {
+  if (rows.values.size() != rows.rows() * rows.dimension)
+    throw InputError(fmt::format("expected {} value{} for each time, the components the model observes",
+                                 rows.dimension, rows.dimension == 1 ? "" : "s"),
+                     origin, fmt::format("{} values for {} times", rows.values.size(), rows.rows()));
+  require_rows(rows.rows(), origin, kind);
+  const auto fail = [&](const char* message, std::size_t row, std::size_t column, double value) {
+    throw InputError(message, fmt::format("{}: row {}, column {}", origin, row + 1, column_name(column)),
+                     fmt::format("{}", value));
+  };
+  for (std::size_t r = 0; r < rows.rows(); ++r) {
+    if (!std::isfinite(rows.times[r])) fail("not a finite number", r, 0, rows.times[r]);
+    if (r > 0 && !(rows.times[r] > rows.times[r - 1])) fail("times must increase", r, 0, rows.times[r]);
+    for (std::size_t i = 0; i < rows.dimension; ++i) {
+      const double y = rows.row(r)[i];
+      if (std::isinf(y)) fail("not a finite number", r, i + 1, y);
+      if (std::isnan(y) && kind == ObservationKind::continuous) fail("a value is missing", r, i + 1, y);
+    }
+  }
+}
+
 ObservationPath read_observations(std::istream& in, const std::string& origin, std::size_t dimension,
                                   ObservationKind kind) {
   ObservationReader reader(in, origin, dimension, kind);
@@ -112,9 +139,7 @@ ObservationPath read_observations(std::istream& in, const std::string& origin, s
   double t = 0;
   std::vector<double> y(dimension);
   while (reader.next(t, y)) path.append(t, y);
-  if (path.rows() == 0) throw InputError("no rows after the header", origin);
-  if (kind == ObservationKind::continuous && path.rows() < 2)
-    throw InputError("a continuous observation needs at least two rows: its start and one more", origin);
+  require_rows(path.rows(), origin, kind);
   return path;
 }
 

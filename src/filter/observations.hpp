@@ -9,14 +9,26 @@
 
 namespace wienertree {
 
-/// Rows of an observation record. Continuous observations: row r is Y at times[r], row 0 its start. Discrete
-/// ones: row r is the observation at times[r], NaN where missing.
+/// Rows of an observation record, where the caller keeps them. Continuous observations: row r is Y at
+/// times[r], row 0 its start. Discrete ones: row r is the observation at times[r], NaN where missing.
+struct ObservationRows {
+  std::size_t dimension = 0;       ///< k
+  std::span<const double> times;   ///< M, strictly increasing
+  std::span<const double> values;  ///< M x k, row after row
+  std::size_t rows() const { return times.size(); }
+  std::span<const double> row(std::size_t r) const { return values.subspan(r * dimension, dimension); }
+};
+
+/// The same, owned.
 struct ObservationPath {
-  std::size_t dimension = 0;   ///< k
-  std::vector<double> times;   ///< M, strictly increasing
-  std::vector<double> values;  ///< M x k, row after row
+  std::size_t dimension = 0;
+  std::vector<double> times;
+  std::vector<double> values;
   std::size_t rows() const { return times.size(); }
   std::span<const double> row(std::size_t r) const { return {values.data() + r * dimension, dimension}; }
+  operator ObservationRows() const {
+    return {dimension, times, values};
+  }  // NOLINT: a record is used as its rows
   void append(double time, std::span<const double> value);
 };
 
@@ -38,6 +50,12 @@ class ObservationReader {
   ObservationKind kind_;
   double last_time_;
 };
+
+/// What a reader verifies of a file, of rows that are in memory.
+/// @throws InputError naming `origin` and the row, from 1: values that are not M x k, fewer than two rows
+/// (continuous) or none (discrete), a time that is not finite or does not increase, a value that is infinite,
+/// or missing where `kind` is continuous
+void check_observations(const ObservationRows& rows, const std::string& origin, ObservationKind kind);
 
 /// Reads a whole record from `in`.
 /// @throws InputError as ObservationReader, and if there are fewer than two rows (continuous) or none

@@ -13,7 +13,7 @@ namespace {
 // Row indices nearest to the uniform grid of n steps, strictly increasing. n <= rows - 1 makes this possible:
 // point j may not go below the point before it plus one, nor above the row that leaves one for each point to
 // come.
-std::vector<std::size_t> grid_rows(const std::vector<double>& t, std::size_t n) {
+std::vector<std::size_t> grid_rows(std::span<const double> t, std::size_t n) {
   std::vector<std::size_t> rows(n + 1, 0);
   const double T = t.back() - t.front();
   for (std::size_t j = 1; j <= n; ++j) {
@@ -27,10 +27,10 @@ std::vector<std::size_t> grid_rows(const std::vector<double>& t, std::size_t n) 
 
 }  // namespace
 
-ObservationWindows::ObservationWindows(const ObservationPath& path, ObservationKind kind,
-                                       ObservationTiming timing, std::size_t steps)
-    : path_(&path), kind_(kind) {
-  const std::vector<double>& t = path.times;
+ObservationWindows::ObservationWindows(ObservationRows path, ObservationKind kind, ObservationTiming timing,
+                                       std::size_t steps)
+    : rows_(path), kind_(kind) {
+  const std::span<const double> t = path.times;
   const std::size_t gaps = path.rows() - 1;
   if (kind == ObservationKind::continuous) {
     if (steps > gaps)
@@ -75,14 +75,14 @@ void ObservationWindows::get(std::size_t j, ObservationWindow& out) const {
   out.start = w.start;
   out.end = w.end;
   if (kind_ == ObservationKind::continuous) {
-    const std::size_t rows = w.last_row - w.first_row + 1, k = path_->dimension;
-    out.row_times = {path_->times.data() + w.first_row, rows};
-    out.row_values = {path_->values.data() + w.first_row * k, rows * k};
+    const std::size_t rows = w.last_row - w.first_row + 1, k = rows_.dimension;
+    out.row_times = {rows_.times.data() + w.first_row, rows};
+    out.row_values = {rows_.values.data() + w.first_row * k, rows * k};
     integrate_rows(out, k);
   } else {
     out.at_start = w.at_start;
     out.observation.clear();
-    if (w.observed) out.observation.assign(path_->row(w.last_row).begin(), path_->row(w.last_row).end());
+    if (w.observed) out.observation.assign(rows_.row(w.last_row).begin(), rows_.row(w.last_row).end());
   }
 }
 

@@ -44,17 +44,16 @@ struct ObservationWindow {
 /// the grid asks for.
 class ObservationWindows {
  public:
-  /// @param steps number of steps n; 0 means one for every row. Windows refer to `path`, which must outlive
+  /// @param steps number of steps n; 0 means one for every row. Windows refer to the rows, which must outlive
   /// them.
   /// @throws InputError if steps exceeds the number of gaps between rows (continuous), or is smaller than it
   /// (discrete), or a first row is given where timing "previous" has no earlier state
-  ObservationWindows(const ObservationPath& path, ObservationKind kind, ObservationTiming timing,
-                     std::size_t steps);
+  ObservationWindows(ObservationRows rows, ObservationKind kind, ObservationTiming timing, std::size_t steps);
   std::size_t size() const { return windows_.size(); }
   /// Window j = 0..size()-1; buffers of `out` are reused.
   void get(std::size_t j, ObservationWindow& out) const;
-  double start() const { return path_->times.front(); }
-  double end() const { return path_->times.back(); }
+  double start() const { return rows_.times.front(); }
+  double end() const { return rows_.times.back(); }
   double time(std::size_t j) const { return windows_[j].end; }
 
  private:
@@ -63,7 +62,7 @@ class ObservationWindows {
     std::size_t first_row, last_row;  ///< continuous: rows inside; discrete: last_row is the row observed
     bool observed, at_start;
   };
-  const ObservationPath* path_;
+  ObservationRows rows_;
   ObservationKind kind_;
   std::vector<Bounds> windows_;
 };

@@ -7,6 +7,7 @@
 namespace wienertree {
 
 std::unique_ptr<Thinning> make_thinning(const ThinningOptions& options) {
+  if (options.own) return options.own();
   switch (options.method) {
     case ThinningMethod::none:
       return std::make_unique<KeepAll>(options.order);

@@ -1,6 +1,7 @@
 #pragma once
 /// Seam 3: a weighted measure in, a smaller weighted measure on some of the same nodes out.
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <span>
 #include <string_view>
@@ -77,6 +78,9 @@ struct ThinningOptions {
   ThinningMethod method = ThinningMethod::tbba;
   SiteOrder order = SiteOrder::spatial;
   int recombination_degree = 0;  ///< moments kept where sites are merged; 0: chosen from d and the budget
+  /// A strategy of the caller's, made once for each tree; `method` then says what kind it is: tbba for one
+  /// that counts particles, recombination for one that merges sites.
+  std::function<std::unique_ptr<Thinning>()> own = {};
 };
 
 std::unique_ptr<Thinning> make_thinning(const ThinningOptions& options);

@@ -57,7 +57,8 @@ WeakResult run_weak(const Model& model, const std::vector<BatchFunction>& payoff
     result.ode_solves += estimate.ode_solves;
     return estimate;
   };
-  for (options.launch = 0; options.launch < run.launches; ++options.launch) {
+  for (std::uint32_t launch = 0; launch < run.launches; ++launch) {
+    options.launch = run.first_launch + launch;
     const WeakEstimate fine = tree(run.steps);
     result.leaves = fine.leaves;
     result.discarded = fine.discarded;

@@ -11,10 +11,10 @@ namespace wienertree {
 struct WeakRun {
   WeakOptions options;  ///< grid and launch are filled in
   GridKind grid = GridKind::uniform;
-  double horizon = 1;      ///< T
-  std::size_t steps = 10;  ///< n
-  double gamma = 1;        ///< of Kusuoka's grid
-  std::uint32_t launches = 1;
+  double horizon = 1;                            ///< T
+  std::size_t steps = 10;                        ///< n
+  double gamma = 1;                              ///< of Kusuoka's grid
+  std::uint32_t launches = 1, first_launch = 0;  ///< launches first_launch, first_launch + 1, ..
   /// Also from ceil(n/2) steps, and the two extrapolated.
   bool richardson = false;
 };

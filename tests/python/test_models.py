@@ -1,0 +1,95 @@
+import pickle
+
+import numpy as np
+import pytest
+
+import wienertree as wt
+
+OU = """
+name = "ou"
+convention = "ito"
+[parameters]
+theta = 0.5
+[state]
+x = { initial = 1.0 }
+[drift]
+x = "-theta*x"
+[diffusion]
+x = ["1"]
+[observation]
+kind = "continuous"
+h = ["x"]
+"""
+
+OU_DICT = {
+    "name": "ou",
+    "convention": "ito",
+    "parameters": {"theta": np.float64(0.5)},
+    "state": {"x": {"initial": 1.0}},
+    "drift": {"x": "-theta*x"},
+    "diffusion": {"x": ["1"]},
+    "observation": {"kind": "continuous", "h": ("x",)},
+}
+
+
+def test_a_name_a_text_a_file_and_a_dict_make_the_same_model(tmp_path, record):
+    file = tmp_path / "ou.toml"
+    file.write_text(OU)
+    results = [wt.filter(source, record).mean for source in (OU, file, str(file), OU_DICT, wt.Model(OU))]
+    for mean in results[1:]:
+        assert np.array_equal(mean, results[0])
+    assert wt.Model("benes").name == "benes"
+    assert "benes" in wt.models() and "heston" in wt.models()
+
+
+def test_what_a_model_says_of_itself():
+    heston = wt.Model("heston")
+    assert heston.states == ["s", "v"]
+    assert heston.noise_dimension == 2
+    assert heston.observation == "none"
+    assert heston.parameters["kappa"] == 2
+    assert np.array_equal(heston.initial, [1, 0.09])
+    benes = wt.Model("benes").analysis()
+    assert benes["exact_filter"] == "benes"
+    assert len(benes["fields"]) == 2
+
+
+def test_parameters_are_replaced():
+    model = wt.Model(OU, set={"theta": 2})
+    assert model.parameters == {"theta": 2}
+    assert model.replace(theta=3).parameters == {"theta": 3}
+    assert model.parameters == {"theta": 2}
+
+
+def test_models_are_pickled_with_their_parameters():
+    for source in (OU, OU_DICT, "ornstein-uhlenbeck"):
+        model = wt.Model(source, set={"theta": 0.25})
+        assert pickle.loads(pickle.dumps(model)).parameters == model.parameters
+
+
+def test_mistakes_name_line_column_key_and_value():
+    with pytest.raises(wt.InputError) as caught:
+        wt.Model(OU.replace("-theta*x", "-teta*x"))
+    assert caught.value.where.startswith("text:9:")
+    assert "theta" in caught.value.what  # the nearest name
+    with pytest.raises(wt.InputError, match="dict.*drift"):
+        wt.Model(OU_DICT | {"drift": {"x": "-theta*"}})
+    with pytest.raises(wt.InputError, match="benes"):
+        wt.Model("bens")
+    with pytest.raises(wt.InputError, match="kapa"):
+        wt.Model("heston", set={"kapa": 1})
+    with pytest.raises(wt.InputError, match="state.x"):
+        wt.Model(OU_DICT | {"state": {"x": {1, 2}}})
+
+
+def test_strings_of_a_dict_survive_any_character():
+    odd = 'a "quoted" \\ name\twith \x7f and \u00e9\U0001d6fc'
+    assert wt.Model(OU_DICT | {"name": odd}).name == odd
+
+
+def test_simulation_is_a_function_of_its_seed():
+    one, same, other = (wt.simulate("benes", horizon=1, steps=100, seed=s) for s in (1, 1, 2))
+    assert one.t.shape == (101,) and one.signal.shape == (101, 1) and one.observations.shape == (101, 1)
+    assert np.array_equal(one.signal, same.signal)
+    assert not np.array_equal(one.signal, other.signal)
+    assert wt.simulate("heston", horizon=1, steps=10).observations.shape[0] == 0
