@@ -177,6 +177,9 @@ class Control {
     const double steps = largest(&WeakErrorSplit::discretisation),
                  thinning = largest(&WeakErrorSplit::thinning), ode = largest(&WeakErrorSplit::ode),
                  sampling = largest(&WeakErrorSplit::sampling), e = target_.tolerance;
+    double size = 0;
+    for (const double value : result_.value) size = std::max(size, std::abs(value));
+    if (e < 1e-14 * size) give_up(fmt::format("rounding alone leaves about {:.0e}", 1e-15 * size));
     if (ode > e / 2 && target_.choose_accuracy && !ode_tightened_) {
       // More steps than were foreseen.
       pilot_solves_ = solves();
@@ -275,7 +278,9 @@ ControlledResult weak_to_tolerance(const Model& model, const std::vector<std::ve
     throw InputError("must be positive", "tolerance", fmt::format("{}", target.tolerance));
   if (target.formulas.empty()) throw InputError("needs a formula", "tolerance");
   if (rungs.empty() || rungs.front().empty()) throw InputError("needs a payoff", "tolerance");
-  if (run.launches == 0) throw InputError("must be at least 1", "launches", "0");
+  if (is_random(run.options) && !target.choose_launches && run.launches < 2)
+    throw InputError("one launch does not show the error of sampling: 2 or more", "launches",
+                     std::to_string(run.launches));
   return Control(model, rungs, run, target)();
 }
 

@@ -148,6 +148,7 @@ TEST_CASE("weak: a tolerance that cannot be reached is one line, exit code 1, wi
            {"--tolerance 1e-7 --nodes 20", "needs more --nodes"},
            {"--tolerance 1e-9 --thin none --degree 7", "--thin recombination"},
            {"--tolerance 1e-4 --thin tbba --nodes 30 --launches 3", "more --nodes or --launches"},
+           {"--tolerance 1e-300", "rounding"},
            {"--tolerance 1e-9 --rtol 1e-2 --atol 1e-2 --degree 5", "smaller --rtol"}}) {
     const Outcome outcome = place.run(heston + options);
     INFO(options << "\n" << outcome.err);
@@ -198,6 +199,7 @@ TEST_CASE("weak: what is wrong is one line and exit code 2") {
       {gbm + "--payoff s --thin levelwise --seed 3", "draws nothing"},
       {gbm + "--payoff s --thin heavy-first --order tree", "--order"},
       {"weak gbm --horizon 1 --payoff s --tolerance 1e-3 --launches 4", "draws nothing"},
+      {"weak gbm --horizon 1 --payoff s --tolerance 1e-3 --thin tbba --launches 1", "2 or more"},
       {gbm + "--payoff s --kink-width -1", "must not be negative"},
       {"weak gmb --horizon 1 --steps 4 --payoff s", "gbm"},
   };
