@@ -101,10 +101,10 @@ void add_weak_options(CLI::App& app, WeakArguments& a) {
              "Standard deviations over which max, min and abs in payoffs are smoothed; 0: not [0.4]");
   add_text(app, "--discount", a.discount, "EXPR", "Payoffs are multiplied by exp(-integral of EXPR)");
   add_number(app, "--tolerance", a.tolerance, Sign::positive,
-             "Chooses steps, degree and nodes for this error, and estimates it part by part");
+             "Chooses steps, degree, nodes or launches for this error, and estimates it part by part");
   app.add_flag("--richardson", a.richardson, "Extrapolate from n/2 and n steps");
-  add_count(app, "--launches", a.launches, 1, "Independent runs of a random thinning, averaged [1]",
-            1'000'000);
+  add_count(app, "--launches", a.launches, 1,
+            "Independent runs of a random thinning, averaged [1, or by --tolerance]", 1'000'000);
   add_count(app, "--seed", a.seed, 0, "Seed of what is random [1]");
   add_count(app, "--threads", a.threads, 1,
             "Threads; results do not depend on them [1, or all for many nodes]", 1024);

@@ -130,22 +130,19 @@ class Control {
     const std::size_t n = run_.steps, N = run_.options.nodes;
     WeakLevels& trees = at_nodes(N);
     const std::vector<double> X = trees.extrapolated(n), X_half = trees.extrapolated(n / 2),
-                              X_quarter = trees.extrapolated(n / 4), V = trees.value(n),
-                              V_half = trees.value(n / 2), V_quarter = trees.value(n / 4),
                               deviation = trees.standard_error(n);
-    const double gain = std::exp2(order_of(run_.options.formula));
+    std::vector<std::vector<double>> V;
+    for (std::size_t m = n; m >= 1 && V.size() < 4; m /= 2) V.push_back(trees.value(m));
     const std::size_t first = first_of_rung(X);
     result_.value.assign(count_, 0.0);
     result_.standard_error.assign(count_, 0.0);
     result_.error.assign(count_, {});
     for (std::size_t k = 0; k < count_; ++k) {
       const std::size_t i = first + k;
-      const double step = std::abs(V[i] - V_half[i]);
-      const double rho = step > 0 ? std::max(1.25, std::abs(V_half[i] - V_quarter[i]) / step) : gain;
       WeakErrorSplit& error = result_.error[k];
-      error.discretisation =
-          std::max({std::abs(X[i] - X_half[i]), std::abs(X_half[i] - X_quarter[i]) / (4 * gain),
-                    step * std::abs(1 / (rho - 1) - 1 / (gain - 1))});
+      std::vector<double> of_payoff;
+      for (const std::vector<double>& values : V) of_payoff.push_back(values[i]);
+      error.discretisation = discretisation_estimate(of_payoff, run_.options.formula.degree);
       if (rungs_ > 1) error.discretisation += std::abs(X[i] - X[i + count_]) * 4 / 3;
       error.ode = ode_[i] * static_cast<double>(n) / 2;
       error.sampling = 2 * deviation[i];
@@ -271,6 +268,17 @@ class Control {
 };
 
 }  // namespace
+
+double discretisation_estimate(std::span<const double> V, int degree) {
+  const double gain = std::exp2((degree - 1) / 2.0);
+  const auto X = [&](std::size_t k) {
+    return k + 1 < V.size() ? V[k] + (V[k] - V[k + 1]) / (gain - 1) : V[k];
+  };
+  const double step = std::abs(V[0] - V[1]);
+  const double rho = step > 0 ? std::max(1.25, std::abs(V[1] - V[2]) / step) : gain;
+  return std::max({std::abs(X(0) - X(1)), std::abs(X(1) - X(2)) / (4 * gain),
+                   step * std::abs(1 / (rho - 1) - 1 / (gain - 1))});
+}
 
 ControlledResult weak_to_tolerance(const Model& model, const std::vector<std::vector<BatchFunction>>& rungs,
                                    const WeakRun& run, const WeakTarget& target) {

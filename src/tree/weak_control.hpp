@@ -1,6 +1,7 @@
 #pragma once
 /// Weak approximation to a tolerance: the number of steps, the degree, the nodes and the launches are chosen,
 /// and the error is estimated part by part.
+#include <span>
 #include <vector>
 
 #include "wienertree/tree/weak_run.hpp"
@@ -32,6 +33,10 @@ struct ControlledResult {
   std::size_t leaves = 0;        ///< of a tree with n steps
   std::uint64_t ode_solves = 0;  ///< of all trees, those for the choices included
 };
+
+/// Of X_n, as below.
+/// @param V V_n, V_{n/2}, V_{n/4} and, unless n = 4, V_{n/8}
+double discretisation_estimate(std::span<const double> V, int degree);
 
 /// X_n is the extrapolation of V_{n/2} and V_n (run_weak), of order above q = (m-1)/2, N the nodes.
 /// Estimates:

@@ -7,7 +7,8 @@
 #include "wienertree/cubature/construct.hpp"
 #include "wienertree/model/cpp_model.hpp"
 #include "wienertree/tree/slabs.hpp"
-#include "wienertree/tree/weak_run.hpp"
+#include "wienertree/tree/weak_control.hpp"
+#include "wienertree/tree/weak_levels.hpp"
 
 using namespace wienertree;
 
@@ -205,6 +206,56 @@ TEST_CASE("extrapolation removes the leading error") {
   const double coarse = run_weak(model, {smooth_payoff()}, run).value[0];
   CHECK(both.extrapolated[0] == extrapolate(coarse, fine.value[0], 3, 5, 5));
   CHECK(both.ode_solves > fine.ode_solves);
+}
+
+TEST_CASE("the estimate of what the steps leave") {
+  // Where the order is not seen: V_n = 7 + 3 n^{-1/2} leaves X_n - 7 = 3 n^{-1/2} (1 - (2^{1/2} - 1)/3).
+  const auto V = [](double n) { return 7 + 3 / std::sqrt(n); };
+  const std::array slow = {V(16), V(8), V(4), V(2)};
+  CHECK(discretisation_estimate(slow, 5) == Approx(0.75 * (1 - (std::sqrt(2.0) - 1) / 3)));
+  // X_8 = X_4 by chance, and V falls by 4 as it should: what is left is (X_4 - X_2) / 2^{q+2} = 3/16.
+  CHECK(discretisation_estimate(std::array{0.0, 1.0, 5.0, 30.0}, 5) == Approx(3.0 / 16));
+  // V_n = n^{-2} + n^{-3}: X_n = -4/3 n^{-3}, of which |X_n - X_{n/2}| is 7 times.
+  const auto W = [](double n) { return 1 / (n * n) + 1 / (n * n * n); };
+  CHECK(discretisation_estimate(std::array{W(16), W(8), W(4), W(2)}, 5) == Approx(28.0 / 3 / 4096));
+  CHECK(discretisation_estimate(std::array{2.0, 2.0, 2.0}, 7) == 0);
+}
+
+TEST_CASE("levels are the trees of a run, launch by launch") {
+  const Model model = bent();
+  WeakRun run = run_of(ThinningMethod::tbba, SiteOrder::spatial, 60);
+  run.launches = 6;
+  run.richardson = true;
+  run.steps = 8;
+  const std::vector<BatchFunction> payoffs = {smooth_payoff(), component(1)};
+  const WeakResult result = run_weak(model, payoffs, run);
+  WeakLevels levels(model, payoffs, run);
+  levels.set_launches(2);
+  CHECK(levels.value(8) != result.value);
+  levels.set_launches(6);
+  for (std::size_t i = 0; i < payoffs.size(); ++i) {
+    CHECK(levels.value(8)[i] == Approx(result.value[i]).epsilon(1e-13));
+    CHECK(levels.extrapolated(8)[i] == Approx(result.extrapolated[i]).epsilon(1e-13));
+    CHECK(levels.standard_error(8)[i] > 0);
+    CHECK(levels.standard_error(8)[i] == Approx(result.extrapolated_standard_error[i]).epsilon(1e-9));
+  }
+  CHECK(levels.extrapolated(1) == levels.value(1));
+  CHECK(levels.ode_solves() == result.ode_solves + levels.ode_solves(1));
+}
+
+TEST_CASE("the error of thinning is told where only the finest tree is thinned") {
+  const Model model = bent();
+  WeakRun run = run_of(ThinningMethod::recombination, {}, 200);  // 11^2 nodes with 2 steps, 11^4 with 4
+  WeakTarget target;
+  target.tolerance = 1;
+  target.formulas = {run.options.formula};
+  target.choose_nodes = false;
+  const ControlledResult result = weak_to_tolerance(model, {{smooth_payoff()}}, run, target);
+  CHECK(result.run.steps == 4);
+  run.options.thinning.method = ThinningMethod::none;
+  const double whole = weak_to_tolerance(model, {{smooth_payoff()}}, run, target).value[0];
+  CHECK(result.error[0].thinning > 0);
+  CHECK(std::abs(result.value[0] - whole) <= result.error[0].thinning);
 }
 
 TEST_CASE("what cannot be run is refused with the reason") {
