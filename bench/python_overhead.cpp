@@ -16,14 +16,15 @@ int main(int argc, char** argv) {
   const Model model = load_model(argv[1]);
   const ObservationPath path = read_observations(argv[2], model.observation_dimension(), model.observation);
   const auto steps = static_cast<std::size_t>(std::atoi(argv[3]));
-  FilterOptions options;
-  const int degree = model.observation == ObservationKind::discrete ? 7 : 5;
-  options.formula = find_formula(degree, static_cast<int>(model.noise_dimension()),
-                                 std::string(WIENERTREE_SOURCE_DIR) + "/data/cubature_formulas");
-  options.thinning.method = ThinningMethod::recombination;
-  options.nodes = 60;
   for (int i = 0; i < std::atoi(argv[4]); ++i) {
     const auto began = std::chrono::steady_clock::now();
+    // A call of Python's chooses its formula among the files, too.
+    FilterOptions options;
+    const int degree = model.observation == ObservationKind::discrete ? 7 : 5;
+    options.formula = find_formula(degree, static_cast<int>(model.noise_dimension()),
+                                   std::string(WIENERTREE_SOURCE_DIR) + "/data/cubature_formulas");
+    options.thinning.method = ThinningMethod::recombination;
+    options.nodes = 60;
     const auto filter = make_filter(model, options);
     const ObservationWindows windows(path, model.observation, model.timing, steps);
     ObservationWindow window;
