@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <charconv>
 #include <cmath>
 #include <cstdio>
@@ -162,6 +163,15 @@ void set_option(CLI::App& app, const std::string& name, const std::vector<std::s
     option->run_callback();
   } catch (const CLI::ParseError& error) {
     throw InputError(error.what(), name);
+  }
+}
+
+void parse_words(CLI::App& app, std::vector<std::string> words) {
+  std::reverse(words.begin(), words.end());  // as CLI11 wants them
+  try {
+    app.parse(words);
+  } catch (const CLI::ParseError& error) {
+    throw usage_error(app, error);
   }
 }
 

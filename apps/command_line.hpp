@@ -79,6 +79,10 @@ void add_assignments(CLI::App& app, Assignments& target);
 /// @throws InputError for an unknown option, with the nearest known one, and as the option does when parsed
 void set_option(CLI::App& app, const std::string& name, const std::vector<std::string>& values);
 
+/// Parses the words of a command line, the program's name left out.
+/// @throws InputError
+void parse_words(CLI::App& app, std::vector<std::string> words);
+
 /// Parses and runs; what a subcommand does is done by its callback. Never throws: errors become one line on
 /// standard error.
 /// @returns the exit code: 0 done, 1 the run failed, 2 wrong usage or bad input

@@ -11,5 +11,6 @@ void add_formulas_command(CLI::App& program);
 void add_model_command(CLI::App& program);
 void add_tree_command(CLI::App& program);
 void add_weak_command(CLI::App& program);
+void add_study_command(CLI::App& program);
 
 }  // namespace wienertree::app

@@ -82,6 +82,10 @@ fs::path model_file(const std::string& name_or_path) {
   return bundled_file(name_or_path, "models", ".toml", "model", "model");
 }
 
+fs::path study_file(const std::string& name_or_path) {
+  return bundled_file(name_or_path, "studies", ".toml", "study", "study");
+}
+
 fs::path formula_path(const std::string& name_or_path, const std::string& option) {
   return bundled_file(name_or_path, "cubature_formulas", ".json", "formula", option);
 }

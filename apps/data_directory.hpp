@@ -21,6 +21,10 @@ std::vector<std::string> bundled_names(const std::string& folder, const std::str
 /// @throws InputError for an unknown name, with the nearest bundled one
 std::filesystem::path model_file(const std::string& name_or_path);
 
+/// A study: a path if it contains '/' or ends in .toml, else the name of a bundled one.
+/// @throws InputError for an unknown name, with the nearest bundled one
+std::filesystem::path study_file(const std::string& name_or_path);
+
 /// A formula: a path if it contains '/' or ends in .json, else the name of a bundled one.
 /// @throws InputError for an unknown name, with the nearest bundled one. `option` names the place in the
 /// message.

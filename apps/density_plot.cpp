@@ -9,7 +9,7 @@
 namespace wienertree::app {
 namespace {
 
-constexpr int width = 860, title_height = 44, panel_height = 350;
+constexpr int title_height = 44, panel_height = 350;
 
 // The outline of the bars as a curve.
 Curve outline(const Histogram& h) {
@@ -42,8 +42,8 @@ std::vector<Piece> pieces_of(const DensityPanel& panel) {
   return pieces;
 }
 
-// What is drawn, in its colour, beside the panel from the top down.
-std::string labels_of(const DensityPanel& panel) {
+// What is drawn, in its colour, from the top down: beside the panel, or in its corner where there is no room.
+std::string labels_of(const DensityPanel& panel, bool inside) {
   std::vector<SideLabel> labels;
   const auto add = [&](bool drawn, const char* text, const char* colour) {
     if (drawn) labels.push_back({text, colour, 1.0});
@@ -53,7 +53,13 @@ std::string labels_of(const DensityPanel& panel) {
   add(panel.prior.has_value(), "prior (dashed)", colour::grey);
   add(panel.prior_nodes.has_value(), "prior", colour::grey);
   add(panel.signal.has_value(), "true signal", colour::vermillion);
-  return labels_at_right(std::move(labels), 20.0 / panel_height);
+  if (!inside) return labels_at_right(std::move(labels), 20.0 / panel_height);
+  std::string commands;
+  for (std::size_t i = 0; i < labels.size(); ++i)
+    commands +=
+        fmt::format("set label {} at graph 0.99,{:.3f} right textcolor rgb \"{}\" noenhanced font \",11\"\n",
+                    quoted(labels[i].text), 0.97 - 0.055 * static_cast<double>(i), labels[i].colour);
+  return commands;
 }
 
 // A vertical line from the axis.
@@ -62,7 +68,7 @@ std::string upright(const std::string& data, double height, double line_width, c
                      line_width, colour);
 }
 
-void draw_panel(Picture& picture, const DensityPanel& panel, std::size_t number) {
+void draw_panel(Picture& picture, const DensityPanel& panel, std::size_t number, bool narrow) {
   const std::vector<Piece> pieces = pieces_of(panel);
   double low = INFINITY, high = -INFINITY, top = 0;
   for (const Piece& piece : pieces) {
@@ -77,7 +83,7 @@ void draw_panel(Picture& picture, const DensityPanel& panel, std::size_t number)
   picture.add(fmt::format(
       "set xrange [{:.9g}:{:.9g}]\nset yrange [0:{:.9g}]\nset xlabel {} noenhanced\nset ylabel \"density\"",
       low, high, 1.12 * top, quoted(panel.state)));
-  picture.add(labels_of(panel));
+  picture.add(labels_of(panel, narrow));
   std::string plot = "plot ";
   for (std::size_t k = 0; k < pieces.size(); ++k) {
     const std::string name = fmt::format("panel{}piece{}", number, k);
@@ -99,19 +105,21 @@ void draw_panel(Picture& picture, const DensityPanel& panel, std::size_t number)
 
 }  // namespace
 
-std::string draw_density(Picture picture, const std::string& title, const std::vector<DensityPanel>& panels) {
+std::string draw_density(Picture picture, const std::string& title, const std::vector<DensityPanel>& panels,
+                         int width) {
   const int count = static_cast<int>(panels.size()), height = title_height + count * panel_height;
+  const bool narrow = width < 640;
   picture.begin(width, height);
-  picture.add(fmt::format("set label 1 {} at screen 0.5,{:.4f} center noenhanced\nset multiplot",
-                          quoted(title), 1 - 0.55 * title_height / height));
-  picture.add(fmt::format("set lmargin at screen {:.4f}\nset rmargin at screen {:.4f}", 86.0 / width,
-                          1 - 150.0 / width));
+  picture.add(fmt::format("set label 1 {} at screen 0.5,{:.4f} center noenhanced font \",{}\"\nset multiplot",
+                          quoted(title), 1 - 0.55 * title_height / height, narrow ? 11 : 14));
+  picture.add(fmt::format("set lmargin at screen {:.4f}\nset rmargin at screen {:.4f}",
+                          (narrow ? 60.0 : 86.0) / width, 1 - (narrow ? 14.0 : 150.0) / width));
   for (int i = 0; i < count; ++i) {
     const double top = 1 - static_cast<double>(title_height + i * panel_height) / height;
     const double bottom = top - static_cast<double>(panel_height - 60) / height;
     picture.add(fmt::format("set tmargin at screen {:.4f}\nset bmargin at screen {:.4f}", top, bottom));
     if (i > 0) picture.add("unset label");
-    draw_panel(picture, panels[static_cast<std::size_t>(i)], static_cast<std::size_t>(i));
+    draw_panel(picture, panels[static_cast<std::size_t>(i)], static_cast<std::size_t>(i), narrow);
   }
   picture.add("unset multiplot");
   return picture.draw();

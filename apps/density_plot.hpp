@@ -30,6 +30,8 @@ std::vector<DensityPanel> density_panels(const std::vector<std::string>& states,
                                          const Posterior* exact, const Posterior* prior);
 
 /// @returns the bytes of the picture  @throws RunError if gnuplot fails
-std::string draw_density(Picture picture, const std::string& title, const std::vector<DensityPanel>& panels);
+/// `width` in pixels: below 640, names of curves stand inside the panel.
+std::string draw_density(Picture picture, const std::string& title, const std::vector<DensityPanel>& panels,
+                         int width = 860);
 
 }  // namespace wienertree::app

@@ -20,6 +20,7 @@ void describe_program(CLI::App& program) {
   add_filter_command(program);
   add_compare_command(program);
   add_weak_command(program);
+  add_study_command(program);
   add_formulas_command(program);
   add_model_command(program);
   add_tree_command(program);

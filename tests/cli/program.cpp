@@ -13,6 +13,7 @@
 #include <limits>
 #include <sstream>
 #include <stdexcept>
+#include <thread>
 
 namespace cli {
 namespace {
@@ -100,6 +101,10 @@ Outcome Workplace::run(const std::string& arguments) const {
     ::_exit(127);
   }
   int status = 0;
+  if (kill_after) {
+    std::this_thread::sleep_for(*kill_after);
+    ::kill(child, SIGKILL);
+  }
   ::waitpid(child, &status, 0);
   Outcome outcome;
   if (WIFEXITED(status)) outcome.code = WEXITSTATUS(status);

@@ -1,7 +1,9 @@
 #pragma once
 /// Runs the program `wienertree` as its users do, in a directory of its own.
+#include <chrono>
 #include <filesystem>
 #include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -27,10 +29,11 @@ class Workplace {
   std::string read(const std::string& name) const;
   std::vector<std::string> files() const;  ///< names, sorted
 
-  std::map<std::string, std::string> environment;  ///< set in addition to the test's own
-  std::string input;                               ///< standard input
-  std::string stdout_to;                           ///< a file, or "closed pipe"; empty: captured
-  unsigned long largest_file = 0;                  ///< bytes a file may have, 0 for any
+  std::map<std::string, std::string> environment;       ///< set in addition to the test's own
+  std::string input;                                    ///< standard input
+  std::string stdout_to;                                ///< a file, or "closed pipe"; empty: captured
+  unsigned long largest_file = 0;                       ///< bytes a file may have, 0 for any
+  std::optional<std::chrono::microseconds> kill_after;  ///< SIGKILL, if it still runs then
 
   /// Runs the program with these arguments, split at spaces.
   Outcome run(const std::string& arguments) const;

@@ -11,16 +11,6 @@ namespace wienertree::text {
 
 namespace {
 
-std::vector<std::string_view> split_lines(std::string_view text) {
-  std::vector<std::string_view> lines;
-  while (true) {
-    const std::size_t end = text.find('\n');
-    lines.push_back(text.substr(0, end));
-    if (end == std::string_view::npos) return lines;
-    text.remove_prefix(end + 1);
-  }
-}
-
 void check_name(const std::string& name, const Location& location) {
   if (!is_identifier(name))
     throw InputError("a name is made of letters, digits and _ and does not start with a digit",
@@ -226,12 +216,7 @@ void add_integral(ModelSource& source, const std::string& name, const std::strin
 
 ModelSource read_model(std::string_view text, const std::string& file) {
   const TomlFile toml_file{file, split_lines(text)};
-  try {
-    return read(toml::parse(text, file), toml_file);
-  } catch (const toml::parse_error& error) {
-    const Location place{file, error.source().begin.line, error.source().begin.column, ""};
-    throw InputError("TOML syntax: " + std::string(error.description()), place.text());
-  }
+  return read(parse_toml(text, file), toml_file);
 }
 
 }  // namespace wienertree::text

@@ -39,6 +39,25 @@ std::size_t byte_offset(std::string_view line, std::size_t column) {
 
 }  // namespace
 
+std::vector<std::string_view> split_lines(std::string_view text) {
+  std::vector<std::string_view> lines;
+  while (true) {
+    const std::size_t end = text.find('\n');
+    lines.push_back(text.substr(0, end));
+    if (end == std::string_view::npos) return lines;
+    text.remove_prefix(end + 1);
+  }
+}
+
+toml::table parse_toml(std::string_view text, const std::string& file) {
+  try {
+    return toml::parse(text, file);
+  } catch (const toml::parse_error& error) {
+    const Location place{file, error.source().begin.line, error.source().begin.column, ""};
+    throw InputError("TOML syntax: " + std::string(error.description()), place.text());
+  }
+}
+
 std::string Section::path_of(std::string_view key) const {
   return path_.empty() ? std::string(key) : fmt::format("{}.{}", path_, key);
 }
@@ -137,6 +156,48 @@ SourceExpression Section::expression_of(const toml::node& node, const std::strin
 
 SourceExpression Section::expression(std::string_view key) const {
   return expression_of(node(key), path_of(key));
+}
+
+std::vector<SourceExpression> Section::values(std::string_view key) const {
+  const std::string path = path_of(key);
+  const auto value_of = [this](const toml::node& node, const std::string& where) {
+    if (const auto* boolean = node.as_boolean())
+      return SourceExpression{boolean->get() ? "true" : "false", locate(node, where), false};
+    if (!node.is_string() && !node.is_number()) fail_type(node, where, "a string, a number or a boolean");
+    return expression_of(node, where);
+  };
+  const toml::node& found = node(key);
+  if (!found.is_array()) return {value_of(found, path)};
+  std::vector<SourceExpression> result;
+  for (const toml::node& element : *found.as_array())
+    result.push_back(value_of(element, fmt::format("{}[{}]", path, result.size() + 1)));
+  if (result.empty()) throw InputError("must not be an empty list", locate(found, path).text());
+  return result;
+}
+
+double Section::number(std::string_view key) const {
+  const toml::node& found = node(key);
+  if (!found.is_number()) fail_type(found, path_of(key), "a number");
+  const double number = *found.value<double>();
+  if (!std::isfinite(number))
+    throw InputError("must be a finite number", locate(found, path_of(key)).text(),
+                     fmt::format("{}", number));
+  return number;
+}
+
+std::uint64_t Section::count(std::string_view key, std::uint64_t least, std::uint64_t most) const {
+  const toml::node& found = node(key);
+  if (!found.is_integer()) fail_type(found, path_of(key), "a whole number");
+  const std::int64_t number = found.as_integer()->get();
+  if (number < 0 || static_cast<std::uint64_t>(number) < least || static_cast<std::uint64_t>(number) > most)
+    throw InputError(fmt::format("must be from {} to {}", least, most), locate(found, path_of(key)).text(),
+                     fmt::format("{}", number));
+  return static_cast<std::uint64_t>(number);
+}
+
+bool Section::is_table(std::string_view key) const {
+  const toml::node* found = table_.get(key);
+  return found != nullptr && found->is_table();
 }
 
 const toml::array& Section::array(const toml::node& node, const std::string& key, const char* wanted) const {

@@ -1,6 +1,7 @@
 #pragma once
 /// A TOML table with errors that name file, line and key. The only header that shows toml++.
 #include <toml++/toml.h>
+#include <cstdint>
 #include <initializer_list>
 #include <string>
 #include <string_view>
@@ -15,6 +16,11 @@ struct TomlFile {
   std::string name;
   std::vector<std::string_view> lines;
 };
+
+/// @returns the lines of `text`, views into it
+std::vector<std::string_view> split_lines(std::string_view text);
+/// @throws InputError naming file, line and column for a mistake in the syntax
+toml::table parse_toml(std::string_view text, const std::string& file);
 
 class Section {
  public:
@@ -38,6 +44,14 @@ class Section {
   /// A string, or a finite number as its text. @throws InputError when missing or of another type
   SourceExpression expression(std::string_view key) const;
   std::vector<SourceExpression> expressions(std::string_view key) const;
+  /// One or a list of strings, finite numbers and booleans, each as its text. @throws InputError for an empty
+  /// list
+  std::vector<SourceExpression> values(std::string_view key) const;
+  /// @throws InputError when missing or no finite number
+  double number(std::string_view key) const;
+  /// @throws InputError when missing or no whole number in [least, most]
+  std::uint64_t count(std::string_view key, std::uint64_t least, std::uint64_t most) const;
+  bool is_table(std::string_view key) const;
   /// A list of lists.
   std::vector<std::vector<SourceExpression>> matrix(std::string_view key) const;
   /// A table, or a list of tables.

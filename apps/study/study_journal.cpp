@@ -1,0 +1,155 @@
+#include "study_journal.hpp"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <sys/file.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <charconv>
+#include <cmath>
+#include <fstream>
+#include <limits>
+#include <sstream>
+#include <system_error>
+
+#include "../output.hpp"
+#include "wienertree/model/error.hpp"
+
+namespace wienertree::app {
+namespace {
+
+std::string reason() { return std::generic_category().message(errno); }
+
+void add_number(std::string& line, double number) {
+  line += ',';
+  if (!std::isnan(number)) fmt::format_to(std::back_inserter(line), "{}", number);
+}
+
+// The fields of a line; quotes taken off.
+std::vector<std::string> fields_of(const std::string& line) {
+  std::vector<std::string> fields(1);
+  bool quoted = false;
+  for (std::size_t i = 0; i < line.size(); ++i) {
+    if (line[i] == '"' && quoted && i + 1 < line.size() && line[i + 1] == '"')
+      fields.back() += line[++i];
+    else if (line[i] == '"')
+      quoted = !quoted;
+    else if (line[i] == ',' && !quoted)
+      fields.emplace_back();
+    else
+      fields.back() += line[i];
+  }
+  return fields;
+}
+
+template <class Number>
+bool parse_whole(const std::string& text, Number& number) {
+  const auto [end, status] = std::from_chars(text.data(), text.data() + text.size(), number);
+  return status == std::errc() && end == text.data() + text.size();
+}
+
+}  // namespace
+
+std::string csv_field(const std::string& text) {
+  if (text.find_first_of(",\"\n\r") == std::string::npos) return text;
+  std::string quoted = "\"";
+  for (const char c : text) quoted += c == '"' ? std::string("\"\"") : std::string(1, c);
+  return quoted + '"';
+}
+
+std::string StudyJournal::header() const {
+  std::string line = "cell,path,launch";
+  for (const std::string& q : quantities_) line += fmt::format(",{0},{0}_reference", q);
+  return line + ",nodes,ode_solves,seconds\n";
+}
+
+std::string StudyJournal::line_of(const RunRecord& r) const {
+  std::string line = fmt::format("{},{},{}", csv_field(r.cell), r.path, r.launch);
+  for (std::size_t q = 0; q < quantities_.size(); ++q) {
+    add_number(line, r.value[q]);
+    add_number(line, r.truth[q]);
+  }
+  for (const double number : {r.nodes, r.ode_solves, r.seconds}) add_number(line, number);
+  return line + '\n';
+}
+
+RunRecord StudyJournal::parse(const std::string& line, std::size_t number) const {
+  const std::vector<std::string> fields = fields_of(line);
+  const auto bad = [&](const std::string& what) {
+    return InputError(what, fmt::format("{}:{}", file_, number), line.substr(0, 80));
+  };
+  if (fields.size() != 6 + 2 * quantities_.size()) throw bad("not the fields of a run");
+  RunRecord r;
+  r.cell = fields[0];
+  if (!parse_whole(fields[1], r.path) || !parse_whole(fields[2], r.launch))
+    throw bad("path and launch must be whole numbers");
+  std::size_t at = 3;
+  const auto next = [&] {
+    double value = std::numeric_limits<double>::quiet_NaN();
+    const std::string& text = fields[at++];
+    if (!text.empty() && !parse_whole(text, value)) throw bad("must be a number");
+    return value;
+  };
+  for (std::size_t q = 0; q < quantities_.size(); ++q) {
+    r.value.push_back(next());
+    r.truth.push_back(next());
+  }
+  r.nodes = next();
+  r.ode_solves = next();
+  r.seconds = next();
+  return r;
+}
+
+StudyJournal::StudyJournal(const std::string& directory, std::vector<std::string> quantities)
+    : file_(directory + "/runs.csv"), quantities_(std::move(quantities)) {
+  lock_ = ::open(directory.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+  if (lock_ < 0) throw InputError("cannot be opened: " + reason(), "--output", directory);
+  if (::flock(lock_, LOCK_EX | LOCK_NB) != 0)
+    throw InputError("another study is running there", "--output", directory);
+  descriptor_ = ::open(file_.c_str(), O_RDWR | O_CREAT | O_APPEND | O_CLOEXEC, 0666);
+  if (descriptor_ < 0) throw InputError("cannot be written: " + reason(), "--output", file_);
+  std::ostringstream all;
+  all << std::ifstream(file_, std::ios::binary).rdbuf();
+  std::string text = std::move(all).str();
+  const std::size_t whole = text.rfind('\n') == std::string::npos ? 0 : text.rfind('\n') + 1;
+  if (whole < text.size() && ::ftruncate(descriptor_, static_cast<off_t>(whole)) != 0)
+    throw RunError("cannot be shortened: " + reason(), "study", file_);
+  text.resize(whole);
+  std::istringstream lines(text);
+  std::string line;
+  for (std::size_t number = 1; std::getline(lines, line); ++number) {
+    if (number > 1)
+      records_.push_back(parse(line, number));
+    else if (line + '\n' != header())
+      throw InputError("holds the runs of a study of other quantities: give another directory", "--output",
+                       file_);
+  }
+  if (!text.empty()) return;
+  const std::string first = header();
+  if (::write(descriptor_, first.data(), first.size()) != static_cast<ssize_t>(first.size()))
+    throw RunError("cannot be written: " + reason(), "study", file_);
+}
+
+StudyJournal::~StudyJournal() {
+  if (descriptor_ >= 0) ::close(descriptor_);
+  if (lock_ >= 0) ::close(lock_);
+}
+
+void StudyJournal::append(const RunRecord& record) {
+  const std::string line = line_of(record);
+  // One write: a run that is killed leaves whole lines, and at most one part of a line at the end.
+  if (::write(descriptor_, line.data(), line.size()) != static_cast<ssize_t>(line.size()))
+    throw RunError("cannot be written: " + reason(), "study", file_);
+}
+
+void StudyJournal::rewrite(const std::vector<RunRecord>& records) {
+  std::string text = header();
+  for (const RunRecord& record : records) text += line_of(record);
+  OutputFile output("--output", file_);
+  output.stage(std::move(text));
+  output.publish();
+  records_ = records;
+}
+
+}  // namespace wienertree::app

@@ -1,0 +1,232 @@
+#include "study_plot.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <set>
+
+namespace wienertree::app {
+namespace {
+
+struct Style {
+  const char* colour;
+  int point;  ///< gnuplot's filled circle, square, triangles, diamond; then the open ones
+  const char* band;
+};
+// Yellow of Okabe and Ito is left out: as a line on white it is hard to see.
+constexpr std::array<Style, 7> styles = {{{colour::blue, 7, "#D00072B2"},
+                                          {colour::vermillion, 5, "#D0D55E00"},
+                                          {colour::green, 9, "#D0009E73"},
+                                          {colour::orange, 13, "#D0E69F00"},
+                                          {"#CC79A7", 11, "#D0CC79A7"},
+                                          {colour::sky, 7, "#D056B4E9"},
+                                          {colour::black, 4, "#D0000000"}}};
+
+struct Range {
+  double low = INFINITY, high = -INFINITY;
+  void include(double v, bool logarithmic) {
+    if (!std::isfinite(v) || (logarithmic && v <= 0)) return;
+    low = std::min(low, v);
+    high = std::max(high, v);
+  }
+  void widen(bool logarithmic, double part) {
+    if (logarithmic) {
+      const double factor = high > low ? std::pow(high / low, part) : 2;
+      low /= factor;
+      high *= factor;
+    } else {
+      const double margin = high > low ? part * (high - low) : std::max(1.0, std::fabs(low));
+      low -= margin;
+      high += margin;
+    }
+  }
+  double fraction(double v, bool logarithmic) const {
+    return logarithmic ? std::log(v / low) / std::log(high / low) : (v - low) / (high - low);
+  }
+};
+
+bool drawable(const LinePoint& p, const StudyPlot& plot) {
+  return std::isfinite(p.y.value) && (!plot.log_x || p.x > 0) && (!plot.log_y || p.y.value > 0);
+}
+
+std::string tic_text(double v) {
+  if (v >= 1e-3 && v < 1e5) return fmt::format("{:g}", v);
+  return fmt::format("{:.0e}", v);
+}
+
+// Decades, and 2 and 5 between them where there are few.
+std::string logarithmic_tics(const Range& range, const std::vector<double>& wanted) {
+  std::vector<double> at;
+  if (!wanted.empty()) {
+    const double least = std::pow(range.high / range.low, 0.055);
+    for (const double v : wanted)
+      if (at.empty() || v / at.back() > least) at.push_back(v);
+  } else {
+    const double decades = std::log10(range.high / range.low);
+    const std::vector<double> steps = decades < 2.5 ? std::vector<double>{1, 2, 5} : std::vector<double>{1};
+    const int every = std::max(1, static_cast<int>(std::ceil(decades / 9)));
+    for (int e = static_cast<int>(std::floor(std::log10(range.low))); e <= std::log10(range.high) + 1; ++e)
+      for (const double s : steps)
+        if (const double v = s * std::pow(10.0, e); v >= range.low && v <= range.high && e % every == 0)
+          at.push_back(v);
+  }
+  std::vector<std::string> tics;
+  for (const double v : at) {
+    const double exponent = std::log10(v);
+    const bool power = std::fabs(exponent - std::round(exponent)) < 1e-9 && (v < 1e-3 || v >= 1e5);
+    tics.push_back(
+        fmt::format("\"{}\" {:.12g}", power ? fmt::format("10^{{{:.0f}}}", exponent) : tic_text(v), v));
+  }
+  return fmt::format("({})", fmt::join(tics, ", "));
+}
+
+const char* usual_x_label(const std::string& axis) {
+  if (axis == "steps") return "steps n";
+  if (axis == "nodes") return "nodes N";
+  if (axis == "seconds") return "processor seconds a run";
+  if (axis == "ode_solves") return "ODE solves a run";
+  if (axis == "until") return "time t";
+  return nullptr;
+}
+
+std::string x_label(const StudyPlot& plot) {
+  if (!plot.x_label.empty()) return plot.x_label;
+  const char* usual = usual_x_label(plot.x);
+  return usual != nullptr ? usual : plot.x;
+}
+
+std::string y_label(const StudyPlot& plot) {
+  return plot.y_label.empty() ? fmt::format("{} of {}", plot.y, plot.quantity) : plot.y_label;
+}
+
+// A band that reaches zero is cut at the bottom of a logarithmic axis.
+void add_line(Picture& picture, const PlotLine& line, const StudyPlot& plot, double bottom,
+              std::size_t number) {
+  std::vector<std::vector<double>> columns(4);
+  for (const LinePoint& p : line.points) {
+    if (!drawable(p, plot)) continue;
+    columns[0].push_back(p.x);
+    columns[1].push_back(p.y.value);
+    columns[2].push_back(std::isnan(p.y.low) ? p.y.value : std::max(p.y.low, bottom));
+    columns[3].push_back(std::isnan(p.y.high) ? p.y.value : p.y.high);
+  }
+  picture.add_data(fmt::format("line{}", number), columns);
+  if (!line.fit) return;
+  std::vector<double> ends;
+  for (const LinePoint& p : line.points)
+    if (drawable(p, plot) &&
+        (!plot.fit_range || (p.x >= plot.fit_range->first && p.x <= plot.fit_range->second)))
+      ends.push_back(p.x);
+  const auto [low, high] = std::minmax_element(ends.begin(), ends.end());
+  picture.add_data(
+      fmt::format("fit{}", number),
+      std::array{std::vector{*low, *high}, std::vector{line.fit->at(*low), line.fit->at(*high)}});
+}
+
+std::string text_of(const PlotLine& line) {
+  return line.fit ? fmt::format("{}: {}", line.label, slope_text(*line.fit)) : line.label;
+}
+
+struct Frame {
+  Range x, y;
+  std::vector<double> x_values;
+};
+
+Frame frame_of(const StudyPlot& plot, const std::vector<PlotLine>& lines) {
+  Frame frame;
+  std::set<double> values;
+  for (const PlotLine& line : lines)
+    for (const LinePoint& p : line.points) {
+      if (!drawable(p, plot)) continue;
+      frame.x.include(p.x, plot.log_x);
+      for (const double y : {p.y.value, p.y.low, p.y.high}) frame.y.include(y, plot.log_y);
+      values.insert(p.x);
+    }
+  frame.x.widen(plot.log_x, 0.04);
+  frame.y.widen(plot.log_y, 0.05);
+  if (plot.x == plot.along && values.size() <= 12) frame.x_values.assign(values.begin(), values.end());
+  return frame;
+}
+
+std::size_t longest(const std::vector<PlotLine>& lines) {
+  std::size_t length = 0;
+  for (const PlotLine& line : lines) length = std::max(length, text_of(line).size());
+  return length;
+}
+
+}  // namespace
+
+std::string slope_text(const SlopeFit& fit) {
+  const double half = (fit.slope_high - fit.slope_low) / 2;
+  return std::isnan(half) ? fmt::format("{:.2f}", fit.slope)
+                          : fmt::format("{:.2f} ± {:.2f}", fit.slope, half);
+}
+
+std::string draw_study_plot(Picture picture, const StudyPlot& plot, const std::vector<PlotLine>& lines,
+                            PlotShape shape) {
+  const bool wide = shape == PlotShape::wide;
+  const Frame frame = frame_of(plot, lines);
+  const int key_line = 20, key_height = wide ? 0 : key_line * static_cast<int>(lines.size()) + 10;
+  const int title_height = plot.title.empty() ? 16 : 44;
+  const int width = wide ? 900 : 400, height = title_height + (wide ? 464 : 308) + key_height;
+  const double left = wide ? 92 : 66,
+               right = wide ? std::min(360.0, 20 + 7.4 * static_cast<double>(longest(lines))) : 14;
+  picture.begin(width, height);
+  const double top = 1 - static_cast<double>(title_height) / height,
+               bottom = static_cast<double>(key_height + 64) / height;
+  picture.add(
+      fmt::format("set lmargin at screen {:.4f}\nset rmargin at screen {:.4f}\nset tmargin at screen {:.4f}\n"
+                  "set bmargin at screen {:.4f}",
+                  left / width, 1 - right / width, top, bottom));
+  if (!plot.title.empty())
+    picture.add(fmt::format("set label 1 {} at screen {:.4f},{:.4f} left noenhanced font \",{}\"",
+                            quoted(plot.title), wide ? left / width : 0.02, 1 - 0.5 * title_height / height,
+                            wide ? 15 : 12));
+  if (plot.log_x) picture.add("set logscale x");
+  if (plot.log_y) picture.add("set logscale y");
+  picture.add(fmt::format("set xrange [{:.9g}:{:.9g}]\nset yrange [{:.9g}:{:.9g}]", frame.x.low, frame.x.high,
+                          frame.y.low, frame.y.high));
+  if (plot.log_x) picture.add("set xtics " + logarithmic_tics(frame.x, frame.x_values));
+  if (plot.log_y) picture.add("set ytics " + logarithmic_tics(frame.y, {}));
+  picture.add("set grid xtics ytics lt 1 lw 0.6 lc rgb \"#E4E4E4\"");
+  // The label of the axis at a place of its own: gnuplot's depends on the terminal's idea of the font.
+  picture.add(fmt::format("set label {} at screen {:.4f},{:.4f} center noenhanced", quoted(x_label(plot)),
+                          (left + width - right) / 2 / width, static_cast<double>(key_height + 16) / height));
+  picture.add(fmt::format("set ylabel {} noenhanced{}", quoted(y_label(plot)), wide ? "" : " offset 1.5,0"));
+  std::vector<SideLabel> labels;
+  for (std::size_t i = 0; i < lines.size(); ++i) {
+    const Style& style = styles[i % styles.size()];
+    double at = 0.5;
+    for (const LinePoint& p : lines[i].points)
+      if (drawable(p, plot)) at = frame.y.fraction(p.y.value, plot.log_y);
+    labels.push_back({text_of(lines[i]), style.colour, at});
+    add_line(picture, lines[i], plot, frame.y.low, i);
+    if (wide) continue;
+    const double y = static_cast<double>(key_height - 12 - key_line * static_cast<int>(i)) / height;
+    picture.add(
+        fmt::format("set label {} at screen 0.07,{:.4f} left textcolor rgb \"{}\" noenhanced font \",12\" "
+                    "point pt {} ps 0.8 lc "
+                    "rgb \"{}\" offset 1.2,0",
+                    quoted(text_of(lines[i])), y, style.colour, style.point, style.colour));
+  }
+  if (wide) picture.add(labels_at_right(std::move(labels), 19.0 / (height - title_height - 64)));
+  std::vector<std::string> pieces;
+  for (std::size_t i = 0; i < lines.size(); ++i)
+    pieces.push_back(fmt::format("$line{} using 1:3:4 with filledcurves fillcolor rgb \"{}\"", i,
+                                 styles[i % styles.size()].band));
+  for (std::size_t i = 0; i < lines.size(); ++i) {
+    const Style& style = styles[i % styles.size()];
+    if (lines[i].fit)
+      pieces.push_back(
+          fmt::format("$fit{} using 1:2 with lines lw 1.3 dashtype (7,5) lc rgb \"{}\"", i, style.colour));
+    pieces.push_back(fmt::format("$line{} using 1:2 with {} lw 1.8 pt {} ps {} lc rgb \"{}\"", i,
+                                 lines[i].fit ? "points" : "linespoints", style.point, wide ? 0.9 : 0.7,
+                                 style.colour));
+  }
+  picture.add(fmt::format("plot {}", fmt::join(pieces, ", ")));
+  return picture.draw();
+}
+
+}  // namespace wienertree::app
