@@ -8,6 +8,7 @@
 #include <cstdio>
 #include <new>
 
+#include "interruption.hpp"
 #include "output.hpp"
 #include "wienertree/model/text/location.hpp"
 
@@ -188,6 +189,10 @@ int run_program(CLI::App& app, int argc, char** argv) {
     }
     return 0;
   } catch (const BrokenPipe&) {
+    return 1;
+  } catch (const Interrupted& interrupted) {
+    complain(interrupted.what(), 1);
+    end_by(interrupted.signal());
     return 1;
   } catch (const InputError& error) {
     return complain(error.what(), 2);

@@ -122,10 +122,16 @@ std::string summary_of(const CompareArguments& a, const std::vector<Contender>& 
   const ComparisonRow& last = rows.back();
   std::size_t width = 5;
   for (const Contender& c : all) width = std::max(width, c.label.size());
-  std::string text = fmt::format(
-      "{} on {}, t = {:g} .. {:g}\n\n  {:<{}} {:>16} {:>12} {:>20} {:>12}\n", describe(all.front().setup),
-      *a.observations == "-" ? "standard input" : *a.observations, rows.front().time, last.time, "model",
-      width, "log evidence", "std. error", "log Bayes factor", "probability");
+  std::string text = fmt::format("{}, t = {:g} .. {:g}\n", *a.observations, rows.front().time, last.time);
+  // A formula that depends on the number of Brownian motions or a default on the dimension may differ.
+  std::string before;
+  for (const Contender& c : all) {
+    const std::string setup = describe(c.setup);
+    if (setup != before) text += fmt::format("  {}{}\n", before.empty() ? "" : c.label + ": ", setup);
+    before = setup;
+  }
+  text += fmt::format("\n  {:<{}} {:>16} {:>12} {:>20} {:>12}\n", "model", width, "log evidence",
+                      "std. error", "log Bayes factor", "probability");
   const std::vector<double> p = last.probabilities();
   for (std::size_t m = 0; m < all.size(); ++m) {
     const std::string error = all[m].setup.launches > 1 ? fmt::format("{:.2g}", last.standard_error[m])

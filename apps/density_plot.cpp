@@ -105,6 +105,10 @@ void draw_panel(Picture& picture, const DensityPanel& panel, std::size_t number,
 
 }  // namespace
 
+void exchange(StateArchive& archive, DensityPanel& p) {
+  archive(p.state, p.nodes, p.rug, p.exact, p.prior, p.prior_nodes, p.signal);
+}
+
 std::string draw_density(Picture picture, const std::string& title, const std::vector<DensityPanel>& panels,
                          int width) {
   const int count = static_cast<int>(panels.size()), height = title_height + count * panel_height;

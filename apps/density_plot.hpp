@@ -13,6 +13,7 @@ namespace wienertree::app {
 /// Density as bars: heights[b] on [edges[b], edges[b+1]].
 struct Histogram {
   std::vector<double> edges, heights;
+  void exchange(StateArchive& archive) { archive(edges, heights); }
 };
 
 struct DensityPanel {
@@ -24,6 +25,8 @@ struct DensityPanel {
   std::optional<Histogram> prior_nodes;
   std::optional<double> signal;
 };
+
+void exchange(StateArchive& archive, DensityPanel& panel);
 
 /// One panel for each of the first `states.size()` components. `exact` and `prior` may be null.
 std::vector<DensityPanel> density_panels(const std::vector<std::string>& states, const Posterior& posterior,

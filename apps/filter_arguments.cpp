@@ -288,7 +288,7 @@ Json options_in_force(const FilterSetup& setup, const Model& model) {
 
 std::string describe(const FilterSetup& setup) {
   const FilterOptions& o = setup.options;
-  if (o.method == FilterMethod::grid) return fmt::format("grid filter, {} cells", o.nodes);
+  if (o.method == FilterMethod::grid) return fmt::format("grid filter, {} cells", o.grid_points);
   if (!keeps_nodes(o.method)) return "exact " + method_name(o.method) + " filter";
   if (o.method == FilterMethod::full_tree) return fmt::format("full tree, degree {}", o.formula.degree);
   if (o.method == FilterMethod::weighted)

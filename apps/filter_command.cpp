@@ -2,15 +2,22 @@
 
 #include <chrono>
 #include <cstdio>
+#include <fstream>
 #include <memory>
+#include <sstream>
 
+#include "checkpoint.hpp"
+#include "checksum.hpp"
 #include "command_line.hpp"
 #include "commands.hpp"
 #include "data_directory.hpp"
 #include "filter_report.hpp"
+#include "filter_table.hpp"
 #include "output.hpp"
 #include "signal_file.hpp"
+#include "wienertree/cubature/formula_file.hpp"
 #include "wienertree/model/text_model.hpp"
+#include "wienertree/version.hpp"
 
 namespace wienertree::app {
 namespace {
@@ -24,7 +31,8 @@ struct FilterCommandArguments {
   std::optional<std::string> observations, signal, output, plot;
   std::optional<TableFormat> format;
   std::optional<std::uint64_t> moments, steps;
-  std::optional<double> density_at;
+  std::optional<double> density_at, checkpoint_every;
+  std::optional<std::string> checkpoint, resume;
   bool quiet = false;
 };
 
@@ -35,15 +43,14 @@ std::optional<Curve> signal_of(const std::optional<ObservationPath>& signal, std
   return curve;
 }
 
-template <class Rows, class Get>
-Band band_of(const Rows& rows, std::size_t state, Get get) {
+// Columns of filter_table: the time, means, standard deviations, then three quantiles a state.
+Band band_of(const std::vector<std::vector<double>>& rows, std::size_t state, std::size_t states) {
   Band band;
-  for (const auto& row : rows) {
-    const PosteriorSummary& s = get(row);
-    band.time.push_back(s.time);
-    band.mean.push_back(s.mean[state]);
-    band.low.push_back(s.q05[state]);
-    band.high.push_back(s.q95[state]);
+  for (const std::vector<double>& row : rows) {
+    band.time.push_back(row[0]);
+    band.mean.push_back(row[1 + state]);
+    band.low.push_back(row[1 + 2 * states + 3 * state]);
+    band.high.push_back(row[3 + 2 * states + 3 * state]);
   }
   return band;
 }
@@ -59,25 +66,36 @@ std::string draw(Picture picture, const FilterContext& c, const FilterRun& run,
     return draw_density(std::move(picture), fmt::format("{}, t = {:g}", what, run.density_time), panels);
   }
   std::vector<PosteriorPanel> panels;
-  for (std::size_t i = 0; i < c.model.reported_dimension(); ++i) {
-    PosteriorPanel panel{c.model.state_names[i],
-                         band_of(
-                             run.rows, i, [](const LaunchesSummary& s) -> const auto& { return s.mean; }),
-                         {},
-                         signal_of(signal, i)};
-    if (!run.exact.empty())
-      panel.exact = band_of(
-          run.exact, i, [](const PosteriorSummary& s) -> const auto& { return s; });
+  const std::size_t states = c.model.reported_dimension();
+  for (std::size_t i = 0; i < states; ++i) {
+    PosteriorPanel panel{c.model.state_names[i], band_of(run.rows, i, states), {}, signal_of(signal, i)};
+    if (!run.exact_rows.empty()) panel.exact = band_of(run.exact_rows, i, states);
     panels.push_back(std::move(panel));
   }
   return draw_posterior(std::move(picture), what, panels);
 }
 
-Table table_of(const FilterContext& c, const FilterRun& run) {
-  const bool several = c.setup.launches > 1;
-  Table table{filter_columns(c.model, c.setup, c.highest_moment), {}};
-  for (const LaunchesSummary& row : run.rows) table.rows.push_back(filter_row(row, several));
-  return table;
+// What makes it this run: everything its results depend on.
+Json identity_of(const FilterCommandArguments& a, const FilterContext& c, bool follow) {
+  std::ifstream in(model_file(a.model), std::ios::binary);
+  std::ostringstream model_text;
+  model_text << in.rdbuf();
+  Json run;
+  run["program"] = "wienertree " WIENERTREE_VERSION;
+  run["command"] = "filter";
+  run["model"] = c.model.name;
+  run["model file's checksum"] = checksum_text(model_text.str());
+  for (const auto& [name, value] : c.model.parameters) run["parameters"][name] = value;
+  run["observations"] = c.windows.identity();
+  run["options"] = options_in_force(c.setup, c.model);
+  if (!c.setup.options.formula.paths.empty())
+    run["formula's checksum"] = checksum_text(format_formula(c.setup.options.formula));
+  run["moments"] = c.highest_moment;
+  if (a.density_at) run["density-at"] = *a.density_at;
+  // What is kept of the rows.
+  run["with --plot"] = a.plot.has_value();
+  run["rows written as they come"] = follow;
+  return run;
 }
 
 void filter_and_write(const FilterCommandArguments& a) {
@@ -90,6 +108,8 @@ void filter_and_write(const FilterCommandArguments& a) {
     throw InputError("is drawn to the file of --plot, which is missing", "--density-at");
   if (a.signal && !a.plot)
     throw InputError("is drawn to the file of --plot, which is missing", "--signal", *a.signal);
+  if (a.checkpoint_every && !a.checkpoint)
+    throw InputError("is the time between two of --checkpoint, which is missing", "--checkpoint-every");
   std::optional<Picture> picture;
   std::optional<OutputFile> plot;
   if (a.plot) {
@@ -99,27 +119,39 @@ void filter_and_write(const FilterCommandArguments& a) {
   OutputFile output("--output", a.output.value_or("-"));
   std::optional<ObservationPath> signal;
   if (a.signal) signal = read_signal(*a.signal, model);
-  const auto windows = open_windows(*a.observations, model, a.steps);
+  const auto windows = open_windows(*a.observations, model, a.steps, a.resume.has_value());
 
   const int highest_moment = static_cast<int>(a.moments.value_or(0));
-  const bool several = setup.launches > 1, csv = a.format.value_or(TableFormat::csv) == TableFormat::csv;
+  const FilterContext context{model, setup, *windows, *a.observations, highest_moment};
+  const bool csv = a.format.value_or(TableFormat::csv) == TableFormat::csv;
   // Rows go out as they come only where they come one by one; a file appears when it is whole.
   const bool follow = windows->streams() && csv && output.target() == "-";
-  FilterRequest request{highest_moment, a.density_at, !a.quiet, {}};
+  FilterRequest request;
+  request.highest_moment = highest_moment;
+  request.density_at = a.density_at;
+  request.progress = !a.quiet;
+  request.keep_rows = !follow || a.plot;
+  request.keep_exact_rows = a.plot.has_value();
+  std::optional<Checkpoint> checkpoint;
+  if (a.checkpoint)
+    checkpoint.emplace(*a.checkpoint, a.checkpoint_every.value_or(5), identity_of(a, context, follow));
+  if (checkpoint) request.checkpoint = &*checkpoint;
+  if (a.resume) request.resume = read_checkpoint(*a.resume, identity_of(a, context, follow));
+  const std::vector<std::string> columns = filter_columns(model, setup, highest_moment);
   if (follow) {
-    write_to_stdout(csv_header(filter_columns(model, setup, highest_moment)));
-    request.observe = [several](const LaunchesSummary& row) {
-      write_to_stdout(csv_row(filter_row(row, several)));
-    };
+    if (!a.resume) write_to_stdout(csv_header(columns));
+    request.observe = [](const std::vector<double>& row) { write_to_stdout(csv_row(row)); };
   }
-  const FilterRun run = run_filter(model, setup, *windows, request);
-  const FilterContext context{model, setup, *windows, *a.observations, highest_moment};
-  if (!follow)
-    output.stage(csv ? to_csv(table_of(context, run))
-                     : to_json(filter_report(context, run), table_of(context, run)));
+  FilterRun run = run_filter(model, setup, *windows, request);
   if (plot) plot->stage(draw(*picture, context, run, signal));
-  if (!follow) output.publish();
+  if (!follow) {
+    const Table table{columns, std::move(run.rows)};
+    output.stage(csv ? to_csv(table) : to_json(filter_report(context, run), table));
+    output.publish();
+  }
   if (plot) plot->publish();
+  // Nodes are never left out without a word.
+  if (a.quiet && run.statistics.dropped_nodes > 0) std::fputs(dropped_line(run).c_str(), stderr);
   if (a.quiet) return;
   const std::chrono::duration<double> took = std::chrono::steady_clock::now() - began;
   std::fputs(filter_summary(context, run, took.count()).c_str(), stderr);
@@ -132,7 +164,7 @@ void add_filter_command(CLI::App& program) {
       *program.add_subcommand("filter", "The law of the signal given its observations, through time");
   const auto a = std::make_shared<FilterCommandArguments>();
   app.add_option("MODEL", a->model, "A bundled model or a TOML file")->required();
-  add_text(app, "--observations", a->observations, "FILE",
+  add_text(app, "--observations,OBSERVATIONS", a->observations, "FILE",
            "CSV with header t,y1,..; - is standard input, row by row")
       ->required();
   add_record_steps(app, a->steps);
@@ -144,6 +176,11 @@ void add_filter_command(CLI::App& program) {
   add_text(app, "--plot", a->plot, "FILE", "A picture of mean and 5-95 % band, .svg or .png");
   add_number(app, "--density-at", a->density_at, Sign::any, "Draw the law at this time instead");
   add_text(app, "--signal", a->signal, "FILE", "The true signal (CSV t,<state>,..), to be drawn as well");
+  add_text(app, "--checkpoint", a->checkpoint, "FILE",
+           "Save the run here now and then, on SIGTERM and SIGINT, and at its end");
+  add_number(app, "--checkpoint-every", a->checkpoint_every, Sign::positive,
+             "Seconds between two checkpoints [5]");
+  add_text(app, "--resume", a->resume, "FILE", "Go on from a checkpoint of this same run");
   app.add_flag("--quiet", a->quiet, "No summary and no progress bar");
   app.footer(
       "Example:\n"

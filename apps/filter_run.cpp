@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "filter_table.hpp"
+#include "interruption.hpp"
 #include "progress.hpp"
 
 namespace wienertree::app {
@@ -32,23 +34,33 @@ class SideBySide {
   }
 
   void record(double time) {
-    filter_.summarise(time, request_.highest_moment, run_.rows.emplace_back());
-    if (exact_) {
-      summarise(exact_->posterior(), model_.reported_dimension(), 0, run_.exact.emplace_back());
-      run_.exact.back().time = time;
-    }
-    if (request_.observe) request_.observe(run_.rows.back());
+    filter_.summarise(time, request_.highest_moment, run_.last);
+    const bool several = setup_.launches > 1;
+    std::vector<double> row = filter_row(run_.last, several);
+    if (request_.observe) request_.observe(row);
+    if (request_.keep_rows) run_.rows.push_back(std::move(row));
+    if (!run_.collapsed_at && run_.last.ratio && run_.last.ratio->collapsed()) run_.collapsed_at = time;
+    if (exact_) record_exact(time);
     // 1e-9 relative: a step that ends at the asked time up to rounding.
     if (request_.density_at && run_.density.empty() &&
         time >= *request_.density_at - 1e-9 * std::fabs(time)) {
       run_.density_time = time;
-      const std::vector<std::string> states(
-          model_.state_names.begin(),
-          model_.state_names.begin() + static_cast<std::ptrdiff_t>(model_.reported_dimension()));
-      run_.density = density_panels(states, filter_.posterior(), exact_ ? &exact_->posterior() : nullptr,
-                                    &prior_->posterior());
+      const auto states = states_of(model_);
+      run_.density = density_panels({states.begin(), states.end()}, filter_.posterior(),
+                                    exact_ ? &exact_->posterior() : nullptr, &prior_->posterior());
     }
   }
+
+  /// All that the rest of the run depends on, and what it has to tell of the part before.
+  void exchange(StateArchive& archive) {
+    filter_.exchange(archive);
+    for (Filter* other : {exact_.get(), prior_.get()})
+      if (other != nullptr) other->exchange(archive);
+    archive(run_.rows, run_.exact_rows, run_.last, run_.exact, run_.collapsed_at, run_.density,
+            run_.density_time);
+  }
+
+  double time() const { return run_.last.mean.time; }
 
   FilterRun finish() {
     run_.statistics = filter_.statistics();
@@ -60,6 +72,16 @@ class SideBySide {
     FilterOptions options;
     options.method = method;
     return make_filter(model, options);
+  }
+
+  void record_exact(double time) {
+    if (!run_.exact) run_.exact.emplace();
+    summarise(exact_->posterior(), model_.reported_dimension(), 0, *run_.exact);
+    run_.exact->time = time;
+    if (!request_.keep_exact_rows) return;
+    LaunchesSummary one;
+    one.mean = *run_.exact;
+    run_.exact_rows.push_back(filter_row(one, false));
   }
 
   const Model& model_;
@@ -84,18 +106,40 @@ void check_density_time(const FilterRequest& request, const WindowSource& window
 
 FilterRun run_filter(const Model& model, const FilterSetup& setup, WindowSource& windows,
                      const FilterRequest& request) {
+  SideBySide filters(model, setup, request);
+  const auto exchange = [&](StateArchive& archive) {
+    windows.exchange(archive);
+    filters.exchange(archive);
+  };
+  if (request.resume) {
+    StateArchive archive(*request.resume);
+    exchange(archive);
+    archive.finish();
+  }
+  const auto save = [&] {
+    StateArchive archive;
+    exchange(archive);
+    request.checkpoint->write(archive.bytes());
+  };
   check_density_time(request, windows);
   refuse_oversized_tree(model, setup.options, windows.size());
-  SideBySide filters(model, setup, request);
-  if (!windows.observed_at_start()) filters.record(windows.start());
+  std::optional<DeferredInterruption> deferred;
+  if (request.checkpoint != nullptr) deferred.emplace();
+  if (!request.resume && !windows.observed_at_start()) filters.record(windows.start());
   {
     Progress progress("filter", windows.size(), request.progress);
-    for (ObservationWindow window; windows.next(window);) {
+    for (ObservationWindow window; noted_interruption() == 0 && windows.next(window);) {
       filters.advance(window);
       filters.record(window.end);
       progress.advance_to(window.step);
+      if (request.checkpoint != nullptr && request.checkpoint->due()) save();
     }
   }
+  if (request.checkpoint != nullptr) save();
+  if (const int signal = noted_interruption(); signal != 0)
+    throw Interrupted(fmt::format("stopped at t = {:g}; --resume {} goes on from there", filters.time(),
+                                  request.checkpoint->file()),
+                      signal);
   FilterRun run = filters.finish();
   if (request.density_at && run.density.empty())
     throw InputError("the observations end before this time", "--density-at",

@@ -2,8 +2,10 @@
 /// Runs a filter over its observations, next to what it is compared with.
 #include <functional>
 #include <optional>
+#include <string>
 #include <vector>
 
+#include "checkpoint.hpp"
 #include "density_plot.hpp"
 #include "launches.hpp"
 #include "window_source.hpp"
@@ -14,19 +16,27 @@ struct FilterRequest {
   int highest_moment = 0;            ///< of the table; 0 for none beyond mean and sd
   std::optional<double> density_at;  ///< time at which the law itself is kept
   bool progress = true;
-  std::function<void(const LaunchesSummary&)> observe;  ///< called with each row as it comes; may be empty
+  bool keep_rows = true;        ///< for a table or a picture afterwards; else memory does not grow with steps
+  bool keep_exact_rows = true;  ///< for a picture
+  std::function<void(const std::vector<double>&)>
+      observe;                        ///< called with each row as it comes; may be empty
+  Checkpoint* checkpoint = nullptr;   ///< written when due, when interrupted, and at the end
+  std::optional<std::string> resume;  ///< the state to go on from
 };
 
 struct FilterRun {
-  std::vector<LaunchesSummary> rows;    ///< the start, then the end of each window
-  std::vector<PosteriorSummary> exact;  ///< of the exact filter at the same times; empty where there is none
-  std::vector<DensityPanel> density;    ///< at the end of the first window not before `density_at`
+  std::vector<std::vector<double>> rows;        ///< of the table: the start, then the end of each window
+  std::vector<std::vector<double>> exact_rows;  ///< of the exact filter, in the same columns
+  LaunchesSummary last;
+  std::optional<PosteriorSummary> exact;  ///< the exact filter's last, where there is one
+  std::optional<double> collapsed_at;     ///< first time when a likelihood ratio rested on too few particles
+  std::vector<DensityPanel> density;      ///< at the end of the first window not before `density_at`
   double density_time = 0;
   FilterStatistics statistics;
 };
 
 /// @throws InputError if the observations end before `density_at` or a row cannot be read; RunError as
-/// Filter::advance
+/// Filter::advance; Interrupted if a noted interruption ended it, its checkpoint being written
 FilterRun run_filter(const Model& model, const FilterSetup& setup, WindowSource& windows,
                      const FilterRequest& request);
 

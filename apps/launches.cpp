@@ -27,6 +27,10 @@ double deviation(const std::vector<PosteriorSummary>& launches, Get get) {
 
 }  // namespace
 
+void exchange(StateArchive& archive, LaunchesSummary& s) {
+  archive(s.mean, s.nodes, s.mean_sd, s.log_evidence_sd, s.ratio);
+}
+
 double log_average(std::span<const double> logarithms) {
   const double largest = *std::max_element(logarithms.begin(), logarithms.end());
   if (largest == -INFINITY) return largest;
@@ -72,6 +76,10 @@ void Launches::summarise(double time, int highest_moment, LaunchesSummary& out) 
   out.log_evidence_sd = deviation(summaries_, log_evidence);
   out.mean.ess = average(summaries_, [](const auto& s) { return s.ess; });
   out.nodes = average(summaries_, [](const auto& s) { return static_cast<double>(s.nodes); });
+}
+
+void Launches::exchange(StateArchive& archive) {
+  for (const auto& filter : filters_) filter->exchange(archive);
 }
 
 std::vector<double> Launches::log_evidences() {

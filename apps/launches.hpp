@@ -20,6 +20,8 @@ struct LaunchesSummary {
   std::optional<LikelihoodRatio> ratio;  ///< of a filter that keeps it: averages of L and of its variance
 };
 
+void exchange(StateArchive& archive, LaunchesSummary& summary);
+
 /// log of the mean of exp(l). @pre not empty
 double log_average(std::span<const double> logarithms);
 
@@ -34,6 +36,7 @@ class Launches {
   void summarise(double time, int highest_moment, LaunchesSummary& out);
   /// Of each launch.
   std::vector<double> log_evidences();
+  void exchange(StateArchive& archive);
   /// Work of all launches together.
   FilterStatistics statistics() const;
 

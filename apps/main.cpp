@@ -1,5 +1,6 @@
 /// The program `wienertree`: parsing, progress, files and pictures around the library.
-#include "output.hpp"
+#include "command_line.hpp"
+#include "interruption.hpp"
 #include "program.hpp"
 
 int main(int argc, char** argv) {

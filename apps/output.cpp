@@ -8,6 +8,7 @@
 #include <array>
 #include <atomic>
 #include <cerrno>
+#include <charconv>
 #include <csignal>
 #include <cstdio>
 #include <cstring>
@@ -47,13 +48,6 @@ void forget(const std::string& name) {
     }
 }
 
-extern "C" void remove_temporaries(int signal) {
-  for (TemporaryName& t : temporaries)
-    if (t.complete) ::unlink(t.name.data());
-  std::signal(signal, SIG_DFL);
-  ::raise(signal);
-}
-
 // 0, or errno of the write that failed. A short write is continued.
 int write_all(int file, std::string_view content) {
   while (!content.empty()) {
@@ -63,6 +57,37 @@ int write_all(int file, std::string_view content) {
     content.remove_prefix(static_cast<std::size_t>(written));
   }
   return 0;
+}
+
+// ".out.csv.host.": what temporary names beside out.csv begin with, on this machine.
+std::string temporary_prefix(const fs::path& target) {
+  std::array<char, 256> host{};
+  if (::gethostname(host.data(), host.size() - 1) != 0) host[0] = 0;
+  return fmt::format(".{}.{}.", target.filename().string(), host.data());
+}
+
+// What a program that was killed has left: the process whose number the name holds is no more.
+void remove_abandoned(const fs::path& target) {
+  const std::string prefix = temporary_prefix(target), suffix = ".tmp";
+  std::error_code failure;
+  for (const auto& entry : fs::directory_iterator(target.parent_path(), failure)) {
+    const std::string name = entry.path().filename().string();
+    if (!name.starts_with(prefix) || !name.ends_with(suffix) || name.size() <= prefix.size() + suffix.size())
+      continue;
+    pid_t process = 0;
+    const char* const end = name.data() + name.size() - suffix.size();
+    const auto [stop, status] = std::from_chars(name.data() + prefix.size(), end, process);
+    if (status == std::errc() && stop == end && process > 0 && ::kill(process, 0) != 0 && errno == ESRCH)
+      ::unlink(entry.path().c_str());
+  }
+}
+
+// A name is kept through a loss of power only when its directory is.
+void sync_directory(const fs::path& directory) {
+  const int opened = ::open(directory.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+  if (opened < 0) return;
+  ::fsync(opened);
+  ::close(opened);
 }
 
 }  // namespace
@@ -91,6 +116,7 @@ OutputFile::OutputFile(std::string option, const std::string& target)
   if (!fs::is_directory(directory, failure)) refuse("there is no such directory");
   if (::access(directory.c_str(), W_OK | X_OK) != 0)
     refuse("its directory cannot be written: " + reason(errno));
+  remove_abandoned(target_);
 }
 
 OutputFile::~OutputFile() {
@@ -109,7 +135,7 @@ void OutputFile::stage(std::string content) {
   };
   const fs::path path(target_);
   const std::string name =
-      (path.parent_path() / fmt::format(".{}.{}.tmp", path.filename().string(), ::getpid())).string();
+      (path.parent_path() / fmt::format("{}{}.tmp", temporary_prefix(path), ::getpid())).string();
   const int file = ::open(name.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
   if (file < 0) fail(errno);
   temporary_ = name;
@@ -137,6 +163,7 @@ void OutputFile::publish() {
     if (std::rename(temporary_.c_str(), target_.c_str()) != 0) fail(errno);
     forget(temporary_);
     temporary_.clear();
+    sync_directory(fs::path(target_).parent_path());
   }
 }
 
@@ -146,11 +173,9 @@ void write_to_stdout(std::string_view content) {
   if (error != 0) throw RunError("cannot be written: " + reason(error), "standard output");
 }
 
-void install_signal_handlers() {
-  std::signal(SIGPIPE, SIG_IGN);
-  std::signal(SIGXFSZ, SIG_IGN);
-  std::signal(SIGINT, remove_temporaries);
-  std::signal(SIGTERM, remove_temporaries);
+void remove_temporary_files() {
+  for (TemporaryName& t : temporaries)
+    if (t.complete) ::unlink(t.name.data());
 }
 
 }  // namespace wienertree::app

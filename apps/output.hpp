@@ -44,8 +44,7 @@ class OutputFile {
 /// @throws BrokenPipe, or RunError for any other failure
 void write_to_stdout(std::string_view content);
 
-/// Temporary files of a program ended by SIGINT or SIGTERM are removed; SIGPIPE and SIGXFSZ become errors of
-/// the write.
-void install_signal_handlers();
+/// Removes the temporary files of all OutputFiles. May be called by a signal handler.
+void remove_temporary_files();
 
 }  // namespace wienertree::app

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "gnuplot.hpp"
+#include "wienertree/model/state_archive.hpp"
 
 namespace wienertree::app {
 
@@ -15,6 +16,7 @@ struct Band {
 
 struct Curve {
   std::vector<double> x, y;
+  void exchange(StateArchive& archive) { archive(x, y); }
 };
 
 /// The value at the point of the curve nearest to x.

@@ -1,10 +1,15 @@
 #include "window_source.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
-#include <iostream>
+#include <istream>
 #include <limits>
 #include <vector>
+
+#include "checksum.hpp"
+#include "standard_input.hpp"
 
 namespace wienertree::app {
 namespace {
@@ -33,6 +38,17 @@ class RecordedWindows final : public WindowSource {
   std::size_t rows() const override { return rows_.rows(); }
   bool has_inner_rows() const override { return inner_rows_; }
   bool streams() const override { return false; }
+  std::string identity() const override {
+    const auto bytes = [](std::span<const double> numbers) {
+      return std::string_view(reinterpret_cast<const char*>(numbers.data()), numbers.size() * sizeof(double));
+    };
+    return fmt::format("{} rows in {} steps, checksum {} {}", rows_.rows(), windows_.size(),
+                       checksum_text(bytes(rows_.times)), checksum_text(bytes(rows_.values)));
+  }
+  void exchange(StateArchive& archive) override {
+    archive(done_);
+    StateArchive::require(done_ <= windows_.size());
+  }
 
  private:
   std::unique_ptr<const ObservationPath> owned_;
@@ -44,14 +60,15 @@ class RecordedWindows final : public WindowSource {
 
 class StreamedWindows final : public WindowSource {
  public:
-  explicit StreamedWindows(const Model& model)
+  StreamedWindows(const Model& model, bool resumed)
       : kind_(model.observation),
         timing_(model.timing),
-        reader_(std::cin, "standard input", model.observation_dimension(), model.observation),
+        stream_(&input_),
+        reader_(stream_, "standard input", model.observation_dimension(), model.observation),
         value_(model.observation_dimension()) {
-    if (!reader_.next(time_, value_)) throw InputError("no rows after the header", "standard input");
+    if (resumed) return;
+    if (!read_row()) throw InputError("no rows after the header", "standard input");
     start_ = time_;
-    rows_ = 1;
     pair_.dimension = value_.size();
     pair_.append(time_, value_);
     if (kind_ == ObservationKind::discrete)
@@ -59,13 +76,12 @@ class StreamedWindows final : public WindowSource {
   }
 
   bool next(ObservationWindow& window) override {
-    if (steps_ == 0 && observed_at_start_) return get(ObservationWindows(pair_, kind_, timing_, 0), window);
-    if (!reader_.next(time_, value_)) {
-      if (rows_ == 1 && kind_ == ObservationKind::continuous)
+    if (steps_ == 0 && observed_at_start_) return get(window);
+    if (!read_row()) {
+      if (rows_ == 1 && kind_ == ObservationKind::continuous && !input_.interrupted())
         throw InputError("a continuous observation needs at least two rows", "standard input");
       return false;
     }
-    ++rows_;
     if (pair_.rows() == 2) {
       pair_.times.erase(pair_.times.begin());
       pair_.values.erase(pair_.values.begin(),
@@ -75,7 +91,7 @@ class StreamedWindows final : public WindowSource {
     if (kind_ == ObservationKind::discrete)
       std::fill(pair_.values.begin(), pair_.values.end(), std::numeric_limits<double>::quiet_NaN());
     pair_.append(time_, value_);
-    return get(ObservationWindows(pair_, kind_, timing_, 0), window);
+    return get(window);
   }
   double start() const override { return start_; }
   bool observed_at_start() const override { return observed_at_start_; }
@@ -84,16 +100,40 @@ class StreamedWindows final : public WindowSource {
   std::size_t rows() const override { return rows_; }
   bool has_inner_rows() const override { return false; }
   bool streams() const override { return true; }
+  std::string identity() const override { return "standard input"; }
+  void exchange(StateArchive& archive) override {
+    archive(pair_.times, pair_.values, time_, start_, rows_, steps_, observed_at_start_);
+    pair_.dimension = value_.size();
+    StateArchive::require(!pair_.times.empty() && pair_.values.size() == pair_.rows() * value_.size());
+  }
 
  private:
-  bool get(const ObservationWindows& windows, ObservationWindow& window) {
-    windows.get(0, window);
+  // A row after the last one; false at the end of the stream, or when interrupted.
+  bool read_row() {
+    const double last = rows_ > 0 ? time_ : -std::numeric_limits<double>::infinity();
+    double time = 0;
+    try {
+      do {
+        if (!reader_.next(time, value_)) return false;
+      } while (!(time > last));
+    } catch (const InputError&) {
+      if (!input_.interrupted()) throw;
+      return false;
+    }
+    time_ = time;
+    ++rows_;
+    return true;
+  }
+  bool get(ObservationWindow& window) {
+    ObservationWindows(pair_, kind_, timing_, 0).get(0, window);
     window.step = ++steps_;
     return true;
   }
 
   ObservationKind kind_;
   ObservationTiming timing_;
+  StandardInput input_;
+  std::istream stream_;
   ObservationReader reader_;
   std::vector<double> value_;
   ObservationPath pair_;
@@ -113,7 +153,7 @@ std::size_t default_steps(const ObservationRows& rows, ObservationKind kind) {
 }
 
 std::unique_ptr<WindowSource> open_windows(const std::string& observations, const Model& model,
-                                           std::optional<std::size_t> steps) {
+                                           std::optional<std::size_t> steps, bool resumed) {
   if (observations != "-") {
     auto path = std::make_unique<const ObservationPath>(
         read_observations(observations, model.observation_dimension(), model.observation));
@@ -123,7 +163,7 @@ std::unique_ptr<WindowSource> open_windows(const std::string& observations, cons
   if (steps)
     throw InputError("needs the whole record; with --observations - every row ends a step", "--steps",
                      std::to_string(*steps));
-  return std::make_unique<StreamedWindows>(model);
+  return std::make_unique<StreamedWindows>(model, resumed);
 }
 
 std::unique_ptr<WindowSource> cut_windows(ObservationRows rows, const Model& model,

@@ -6,6 +6,7 @@
 #include <string>
 
 #include "wienertree/filter/window.hpp"
+#include "wienertree/model/state_archive.hpp"
 
 namespace wienertree::app {
 
@@ -26,16 +27,22 @@ class WindowSource {
   /// trapezoid.
   virtual bool has_inner_rows() const = 0;
   virtual bool streams() const = 0;
+  /// What tells a record from another one.
+  virtual std::string identity() const = 0;
+  /// How far it has come. A stream that has read this takes rows after the last one it had and passes over
+  /// those before.
+  virtual void exchange(StateArchive& archive) = 0;
 };
 
 /// "-" is standard input, where every row ends a window; else a file, cut into `steps` windows. Without
 /// `steps`: at least `usual_steps` where the rows allow it, no more than needed for one a row.
+/// `resumed`: its `exchange` will read, so that standard input may have no row to begin with.
 /// @throws InputError for a file that cannot be read, steps that do not fit it, or steps with standard input
 inline constexpr std::size_t usual_steps = 200;
 /// The steps of a record for which none are given.
 std::size_t default_steps(const ObservationRows& rows, ObservationKind kind);
 std::unique_ptr<WindowSource> open_windows(const std::string& observations, const Model& model,
-                                           std::optional<std::size_t> steps);
+                                           std::optional<std::size_t> steps, bool resumed = false);
 
 /// A record in memory, which must outlive what is returned, cut in the same way.
 /// @throws InputError for steps that do not fit it

@@ -56,6 +56,10 @@ void BenesFilter::advance(const ObservationWindow& window) {
   P_ = p_.sigma * p_.sigma * tanh_over(observed_ ? std::fabs(p_.h1 * p_.sigma) : 0.0, elapsed_);
 }
 
+void BenesFilter::exchange_state(StateArchive& archive) {
+  archive(elapsed_, m_, P_, log_z_, posterior_.time);
+}
+
 const Posterior& BenesFilter::posterior() {
   const double tilt = p_.mu / p_.sigma;
   points_(0, 0) = m_ + tilt * P_;

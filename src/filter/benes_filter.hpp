@@ -26,6 +26,7 @@ class BenesFilter final : public Filter {
   std::string_view name() const override { return "benes"; }
 
  private:
+  void exchange_state(StateArchive& archive) override;
   void pass_row(double t0, double t1, double increment);
 
   BenesParameters p_;

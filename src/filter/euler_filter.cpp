@@ -133,8 +133,15 @@ void EulerFilter::move(const ObservationWindow& window, std::size_t first, Const
 }
 
 void EulerFilter::normalise() {
-  if (stale_) normalised_.assign(log_weight_, {}, time_);
+  if (stale_) normalised_.assign(log_weight_, {}, statistics_.steps, time_);
   stale_ = false;
+}
+
+void EulerFilter::exchange_state(StateArchive& archive) {
+  archive(x_, log_weight_, time_, weighed_, kept_);
+  StateArchive::require(x_.components() == next_.components() && x_.nodes() == next_.nodes() &&
+                        log_weight_.size() == x_.nodes());
+  stale_ = true;
 }
 
 const Posterior& EulerFilter::posterior() {

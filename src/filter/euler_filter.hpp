@@ -19,6 +19,7 @@ class EulerFilter final : public Filter {
   std::string_view name() const override { return "euler"; }
 
  private:
+  void exchange_state(StateArchive& archive) override;
   /// What a thread needs for a block.
   struct Scratch {
     Batch noise, sensor, derivative, end_sensor;

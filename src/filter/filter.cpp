@@ -48,7 +48,7 @@ void check_particle_options(const FilterOptions& options) {
   check_ess_threshold(options);
   if (recombines(options.thinning.method))
     throw InputError("particles need a thinning that counts them; recombination keeps weights", "thin",
-                     "recombination");
+                     std::string(make_thinning(options.thinning)->name()));
 }
 
 void check_mixture_options(const FilterOptions& options) {
@@ -68,6 +68,17 @@ void check_mixture_options(const FilterOptions& options) {
 
 std::unique_ptr<Functional> make_functional(const FilterOptions& options) {
   return options.own_functional ? options.own_functional() : make_functional(options.functional);
+}
+
+void exchange(StateArchive& archive, LikelihoodRatio& ratio) {
+  archive(ratio.log_mean, ratio.log_variance, ratio.effective_size);
+}
+
+void Filter::exchange(StateArchive& archive) {
+  FilterStatistics& s = statistics_;
+  archive(s.flow.node_segments, s.flow.field_evaluations, s.flow.cvode_nodes, s.steps, s.children,
+          s.dropped_nodes, s.discarded);
+  exchange_state(archive);
 }
 
 std::unique_ptr<Filter> make_filter(const Model& model, const FilterOptions& options) {

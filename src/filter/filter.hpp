@@ -13,6 +13,7 @@
 #include "wienertree/filter/weights.hpp"
 #include "wienertree/filter/window.hpp"
 #include "wienertree/model/model.hpp"
+#include "wienertree/model/state_archive.hpp"
 #include "wienertree/tree/generation.hpp"
 #include "wienertree/tree/thinning.hpp"
 
@@ -38,6 +39,8 @@ struct LikelihoodRatio {
   bool collapsed() const { return effective_size < 10; }
 };
 
+void exchange(StateArchive& archive, LikelihoodRatio& ratio);
+
 /// One step each: `advance` takes the next window, `posterior` is the law at its end.
 class Filter {
  public:
@@ -54,8 +57,14 @@ class Filter {
   /// For filters that keep likelihood ratios, else nothing.
   virtual std::optional<LikelihoodRatio> likelihood_ratio() { return {}; }
   const FilterStatistics& statistics() const { return statistics_; }
+  /// Writes or reads all that later steps depend on. A filter that was made with the same arguments (but for
+  /// the number of threads) and has read what another wrote goes on with the same bytes; its posterior is
+  /// defined from its next step on.
+  /// @throws InputError for bytes that are not the state of such a filter
+  void exchange(StateArchive& archive);
 
  protected:
+  virtual void exchange_state(StateArchive& archive) = 0;
   FilterStatistics statistics_;
 };
 

@@ -194,8 +194,16 @@ void GaussianMixtureFilter::observe(const ObservationWindow& window, bool spread
 }
 
 void GaussianMixtureFilter::normalise() {
-  if (stale_) normalised_.assign(log_weight_, {}, time_);
+  if (stale_) normalised_.assign(log_weight_, {}, statistics_.steps, time_);
   stale_ = false;
+}
+
+void GaussianMixtureFilter::exchange_state(StateArchive& archive) {
+  archive(v_, covariance_, spread_, log_weight_, time_, weighed_, kept_);
+  StateArchive::require(v_.components() == next_.components() && v_.nodes() == next_.nodes() &&
+                        covariance_.components() == next_covariance_.components() &&
+                        covariance_.nodes() == v_.nodes() && log_weight_.size() == v_.nodes());
+  stale_ = true;
 }
 
 const Posterior& GaussianMixtureFilter::posterior() {

@@ -36,6 +36,7 @@ class GaussianMixtureFilter final : public Filter {
   std::string_view name() const override { return "gaussian-mixture"; }
 
  private:
+  void exchange_state(StateArchive& archive) override;
   /// What a thread needs for a block.
   struct Scratch {
     Batch noise, diffusion, sensor, derivative, end_sensor, root;

@@ -132,8 +132,11 @@ double GridFilter::spread_point(double length, std::span<const double> slope,
 }
 
 void GridFilter::prepare_fields(const ObservationWindow& window) {
-  if (fields_current_) return;
-  fields_.read(density_.grid(), place(window));
+  if (!fields_current_) read_fields(place(window));
+}
+
+void GridFilter::read_fields(const std::string& where) {
+  fields_.read(density_.grid(), where);
   fokker_planck(density_.grid(), fields_.drift(), fields_.variance(), generator_);
   exponential_of_ = 0;
   fields_current_ = true;
@@ -233,6 +236,20 @@ void GridFilter::weigh(const ObservationWindow& window) {
     fields_current_ = false;
   }
   throw RunError("the likelihood is too narrow for the grid", place_and_observation(window));
+}
+
+// A factorisation serves for times that differ by rounding: it is that of the same time afterwards.
+void GridFilter::exchange_state(StateArchive& archive) {
+  bool fields_were_current = fields_current_;
+  double exponential_was_of = exponential_of_;
+  archive(spread_, density_, log_evidence_, posterior_.time, fields_were_current, exponential_was_of);
+  if (!archive.reading()) return;
+  fields_current_ = false;
+  if (!fields_were_current) return;
+  read_fields("checkpoint");
+  if (!(exponential_was_of > 0)) return;
+  exponential_.assign(generator_, exponential_was_of);
+  exponential_of_ = exponential_was_of;
 }
 
 const Posterior& GridFilter::posterior() {

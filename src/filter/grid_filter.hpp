@@ -38,6 +38,7 @@ class GridFilter final : public Filter {
   std::string_view name() const override { return "grid"; }
 
  private:
+  void exchange_state(StateArchive& archive) override;
   double spread_point(double length, std::span<const double> slope, const ObservationWindow& window);
   void evolve(double length, std::span<const double> slope, const ObservationWindow& window);
   void guarded_step(double s, std::span<const double> slope, const ObservationWindow& window);
@@ -46,6 +47,7 @@ class GridFilter final : public Filter {
   void weigh(const ObservationWindow& window);
   void multiply(double factor, double noise, const ObservationWindow& window);
   void prepare_fields(const ObservationWindow& window);
+  void read_fields(const std::string& where);
 
   Model model_;
   double longest_step_;  // in units of 1/rate

@@ -36,9 +36,7 @@ KalmanBucyFilter::KalmanBucyFilter(const Model& model)
 
 void KalmanBucyFilter::advance(const ObservationWindow& window) {
   const auto k = static_cast<std::size_t>(model_.H.rows());
-  if (!riccati_)
-    riccati_.emplace(model_.A, model_.Q, model_.H, P_,
-                     observed_ ? window.row_times[1] - window.row_times[0] : window.length());
+  if (!riccati_) start_riccati(observed_ ? window.row_times[1] - window.row_times[0] : window.length());
   if (observed_)
     for (std::size_t r = 0; r + 1 < window.rows(); ++r) {
       const double length = window.row_times[r + 1] - window.row_times[r];
@@ -52,6 +50,30 @@ void KalmanBucyFilter::advance(const ObservationWindow& window) {
     pass_gap(window.length(), increment_);
   posterior_.time = window.end;
   ++statistics_.steps;
+}
+
+void KalmanBucyFilter::start_riccati(double tau) {
+  riccati_tau_ = tau;
+  riccati_.emplace(model_.A, model_.Q, model_.H, model_.covariance, tau);
+}
+
+void KalmanBucyFilter::riccati_at(double t, Eigen::MatrixXd& P) {
+  if (!first_riccati_at_) first_riccati_at_ = t;
+  riccati_->at(t, P);
+}
+
+// CVODE's own steps depend on the equation and on the first time it is read at, on no later one: integrated
+// again from the start it is where it was.
+void KalmanBucyFilter::exchange_state(StateArchive& archive) {
+  archive(elapsed_, m_, P_, log_evidence_, posterior_.time, riccati_tau_, first_riccati_at_);
+  const Eigen::Index d = model_.A.rows();
+  StateArchive::require(m_.size() == d && P_.rows() == d && P_.cols() == d);
+  if (!archive.reading()) return;
+  riccati_.reset();
+  if (!first_riccati_at_) return;
+  start_riccati(riccati_tau_);
+  riccati_->at(*first_riccati_at_, stage_P_);
+  riccati_->at(elapsed_, stage_P_);
 }
 
 // A bound for |F| on the step to come, F = A - P H^T H: P may grow towards its equilibrium, where
@@ -78,7 +100,7 @@ void KalmanBucyFilter::gauss_step(double s, const Eigen::VectorXd& slope) {
   const auto& H = model_.H;
   system_.setIdentity();
   for (Eigen::Index i = 0; i < 3; ++i) {
-    riccati_->at(elapsed_ + node[static_cast<std::size_t>(i)] * s, stage_P_);
+    riccati_at(elapsed_ + node[static_cast<std::size_t>(i)] * s, stage_P_);
     gain_.noalias() = stage_P_ * H.transpose();
     drift_ = model_.A;
     drift_.noalias() -= gain_ * H;
@@ -98,7 +120,7 @@ void KalmanBucyFilter::gauss_step(double s, const Eigen::VectorXd& slope) {
   }
   for (Eigen::Index j = 0; j < 3; ++j)
     m_ += s * weight[static_cast<std::size_t>(j)] * slopes_.segment(j * d, d);
-  riccati_->at(elapsed_ + s, P_);
+  riccati_at(elapsed_ + s, P_);
 }
 
 const Posterior& KalmanBucyFilter::posterior() {

@@ -30,14 +30,20 @@ class KalmanBucyFilter final : public Filter {
   std::string_view name() const override { return "kalman-bucy"; }
 
  private:
+  void exchange_state(StateArchive& archive) override;
   void pass_gap(double length, const Eigen::VectorXd& slope);
   void gauss_step(double s, const Eigen::VectorXd& slope);
   double rate() const;
 
   LinearGaussianModel model_;
   bool observed_;
+  void start_riccati(double tau);
+  void riccati_at(double t, Eigen::MatrixXd& P);
+
   std::optional<RiccatiEquation> riccati_;
-  double elapsed_ = 0;  // since the start
+  double riccati_tau_ = 0;                  // with which it was made
+  std::optional<double> first_riccati_at_;  // time at which it was read first
+  double elapsed_ = 0;                      // since the start
   Eigen::VectorXd m_;
   Eigen::MatrixXd P_;
   double log_evidence_ = 0;

@@ -102,6 +102,11 @@ void KalmanFilter::weigh(const ObservationWindow& window) {
   }
 }
 
+void KalmanFilter::exchange_state(StateArchive& archive) {
+  archive(m_, P_, log_evidence_, posterior_.time);
+  StateArchive::require(m_.size() == model_.A.rows() && P_.rows() == m_.size() && P_.cols() == m_.size());
+}
+
 const Posterior& KalmanFilter::posterior() {
   gaussian_.assign(m_, P_, posterior_);
   posterior_.log_evidence = log_evidence_;

@@ -43,6 +43,7 @@ class KalmanFilter final : public Filter {
   std::string_view name() const override { return "kalman"; }
 
  private:
+  void exchange_state(StateArchive& archive) override;
   void predict(double length);
   void weigh(const ObservationWindow& window);
 

@@ -47,8 +47,9 @@ void KlvFilter::advance(const ObservationWindow& window) {
   if (window.length() > 0) {
     grow(window);
     weigh(window);
-    thin(window);
   }
+  check_log_weights(likelihood_of(window.length() > 0 ? children_ : survivors_), window);
+  if (window.length() > 0) thin(window);
   ++statistics_.steps;
   time_ = window.end;
   stale_ = true;
@@ -84,12 +85,15 @@ void KlvFilter::grow(const ObservationWindow& window) {
   children_.time = window.end;
   current_ = &children_;
   statistics_.children += children_.size();
-  statistics_.flow = grower_.statistics();
+  statistics_.flow = flow_before_;
+  statistics_.flow += grower_.statistics();
   if (!failures_.empty()) handle_failures(window);
 }
 
 void KlvFilter::handle_failures(const ObservationWindow& window) {
-  if (options_.on_node_failure == OnNodeFailure::stop) throw_node_failure(failures_, model_, place(window));
+  // Where every node fails, none is left to stand for those that are dropped.
+  if (options_.on_node_failure == OnNodeFailure::stop || failures_.size() == children_.size())
+    throw_node_failure(failures_, model_, place(window));
   for (const NodeFailure& f : failures_) {
     // A dropped node has no mass; its state is its parent's, so that nothing downstream meets a NaN.
     children_.log_weight[f.node] = -std::numeric_limits<double>::infinity();
@@ -165,8 +169,20 @@ void KlvFilter::let_likelihoods_decide_if_due() {
   for (std::size_t n = 0; n < q.size(); ++n) q[n] += std::exchange(L[n], 0.0);
 }
 
+void KlvFilter::exchange_state(StateArchive& archive) {
+  Generation& g = survivors_;
+  archive(g.time, g.states, g.log_weight, g.log_likelihood, g.parent, g.branch, g.count, time_);
+  StateArchive::require(g.states.components() == model_.state_dimension() && g.size() > 0 &&
+                        g.log_weight.size() == g.size() &&
+                        g.log_likelihood.size() == (carries_likelihood() ? g.size() : 0));
+  if (!archive.reading()) return;
+  flow_before_ = statistics_.flow;
+  current_ = &survivors_;
+  stale_ = true;
+}
+
 const Posterior& KlvFilter::posterior() {
-  if (stale_) normalised_.assign(current_->log_weight, current_->log_likelihood, time_);
+  if (stale_) normalised_.assign(current_->log_weight, current_->log_likelihood, statistics_.steps, time_);
   stale_ = false;
   posterior_.time = time_;
   posterior_.log_evidence = normalised_.log_mass;

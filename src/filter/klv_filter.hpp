@@ -19,6 +19,7 @@ class KlvFilter final : public Filter {
   const Generation* generation() const override { return &survivors_; }
 
  private:
+  void exchange_state(StateArchive& archive) override;
   void observe_start(const ObservationWindow& window);
   void grow(const ObservationWindow& window);
   void weigh(const ObservationWindow& window);
@@ -41,6 +42,7 @@ class KlvFilter final : public Filter {
   std::vector<Batch> child_sensor_;  ///< scratch, one a thread
   std::vector<double> start_term_, term_;
   std::vector<NodeFailure> failures_;
+  FlowStatistics flow_before_;  ///< work of the filter whose state was read
   double time_ = 0;
   NormalisedWeights normalised_;
   bool stale_ = true;

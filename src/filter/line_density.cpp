@@ -151,4 +151,9 @@ void LineDensity::gaussian_sum(std::span<double> point, std::span<double> weight
   }
 }
 
+void LineDensity::exchange(StateArchive& archive) {
+  archive(grid_.lower, grid_.width, at_lowest_, at_highest_, values_);
+  StateArchive::require(values_.size() == grid_.cells);
+}
+
 }  // namespace wienertree

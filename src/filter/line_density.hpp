@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "wienertree/filter/fokker_planck.hpp"
+#include "wienertree/model/state_archive.hpp"
 
 namespace wienertree {
 
@@ -46,6 +47,7 @@ class LineDensity {
   bool follow_mass();
   /// Makes the grid 1.6 times as wide, where the bounds allow.
   void widen();
+  void exchange(StateArchive& archive);
 
   /// The density as sum_i weight_i N(point_i, width^2): masses at the nodes under width exp(-width^2/2
   /// d^2/dx^2), the inverse of the Gaussians' smoothing, up to width^8 with differences of order 8 and even

@@ -50,7 +50,7 @@ double noise_overlap_by_quadrature(const NoiseLaw& law, double a, double b) {
     boost::math::quadrature::tanh_sinh<double> interval;
     double sum = half_line.integrate([&](double z) { return integrand(kinks[0] - z); }, tolerance) +
                  half_line.integrate([&](double z) { return integrand(kinks[2] + z); }, tolerance);
-    for (const std::size_t i : {0, 1})
+    for (std::size_t i = 0; i < 2; ++i)
       if (kinks[i + 1] > kinks[i]) sum += interval.integrate(integrand, kinks[i], kinks[i + 1], tolerance);
     if (std::isfinite(sum)) return sum;
   } catch (const std::exception&) {

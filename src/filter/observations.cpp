@@ -59,7 +59,9 @@ ObservationReader::ObservationReader(std::istream& in, std::string origin, std::
       last_time_(-std::numeric_limits<double>::infinity()) {
   std::string expected = "t";
   for (std::size_t i = 1; i <= dimension_; ++i) expected += fmt::format(",y{}", i);
-  if (!std::getline(in_, line_)) throw InputError("empty: expected the header " + expected, origin_);
+  if (!std::getline(in_, line_))
+    throw in_.bad() ? InputError("reading failed", origin_ + ":1")
+                    : InputError("empty: expected the header " + expected, origin_);
   ++line_number_;
   std::string_view rest = line_;
   if (rest.starts_with("\xef\xbb\xbf")) rest.remove_prefix(3);  // byte order mark of some spreadsheets

@@ -64,6 +64,10 @@ double raw_moment(const Posterior& posterior, std::size_t i, int order) {
 
 double effective_sample_size(const Posterior& posterior) { return 1 / sum_of_squares(posterior.weight); }
 
+void exchange(StateArchive& archive, PosteriorSummary& s) {
+  archive(s.time, s.log_evidence, s.ess, s.nodes, s.mean, s.sd, s.q05, s.q50, s.q95, s.moments);
+}
+
 void summarise(const Posterior& posterior, std::size_t components, int highest_moment,
                PosteriorSummary& out) {
   constexpr std::array levels = {0.05, 0.5, 0.95};

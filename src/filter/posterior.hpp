@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "wienertree/model/batch.hpp"
+#include "wienertree/model/state_archive.hpp"
 
 namespace wienertree {
 
@@ -42,6 +43,8 @@ struct PosteriorSummary {
   std::vector<double> q05, q50, q95;         ///< per component
   std::vector<std::vector<double>> moments;  ///< moments[i][k-2] = E[X_i^k], k = 2..K
 };
+
+void exchange(StateArchive& archive, PosteriorSummary& summary);
 
 /// @param components how many states to report, @param highest_moment K, 0 or 1 for none
 void summarise(const Posterior& posterior, std::size_t components, int highest_moment, PosteriorSummary& out);

@@ -22,14 +22,15 @@ template <class Add>
                                                      std::size_t gaps) {
   const double start = t[0], last = y[gaps * stride];
   double i0[lanes] = {}, j1[lanes] = {}, j2[lanes] = {};
-  for_gaps(gaps, [&] [[gnu::always_inline]] (std::size_t r, std::size_t lane) {
-    const double u = t[r] - start, v = t[r + 1] - start, delta = v - u;
-    const double p = delta * (last - y[r * stride]), q = delta * (last - y[(r + 1) * stride]);
-    const double uu = u * u, vv = v * v, square = (u + v) * (u + v);
-    i0[lane] += p + q;
-    j1[lane] += p * (u + u + v) + q * (u + v + v);
-    j2[lane] += p * (uu + uu + square) + q * (vv + vv + square);
-  });
+  for_gaps(
+      gaps, [&](std::size_t r, std::size_t lane) __attribute__((always_inline)) {
+        const double u = t[r] - start, v = t[r + 1] - start, delta = v - u;
+        const double p = delta * (last - y[r * stride]), q = delta * (last - y[(r + 1) * stride]);
+        const double uu = u * u, vv = v * v, square = (u + v) * (u + v);
+        i0[lane] += p + q;
+        j1[lane] += p * (u + u + v) + q * (u + v + v);
+        j2[lane] += p * (uu + uu + square) + q * (vv + vv + square);
+      });
   RowIntegrals sum;
   for (std::size_t lane = 0; lane < lanes; ++lane) {
     sum.i0 += i0[lane] / 2;
@@ -44,11 +45,12 @@ template <class Add>
                                               std::size_t stride, std::size_t gaps) {
   const double last_a = a[gaps * stride], last_b = b[gaps * stride];
   double sums[lanes] = {}, sum = 0;
-  for_gaps(gaps, [&] [[gnu::always_inline]] (std::size_t r, std::size_t lane) {
-    const double pa = last_a - a[r * stride], qa = last_a - a[(r + 1) * stride];
-    const double pb = last_b - b[r * stride], qb = last_b - b[(r + 1) * stride];
-    sums[lane] += (t[r + 1] - t[r]) * (2 * (pa * pb + qa * qb) + pa * qb + qa * pb);
-  });
+  for_gaps(
+      gaps, [&](std::size_t r, std::size_t lane) __attribute__((always_inline)) {
+        const double pa = last_a - a[r * stride], qa = last_a - a[(r + 1) * stride];
+        const double pb = last_b - b[r * stride], qb = last_b - b[(r + 1) * stride];
+        sums[lane] += (t[r + 1] - t[r]) * (2 * (pa * pb + qa * qb) + pa * qb + qa * pb);
+      });
   for (const double x : sums) sum += x;
   return sum / 6;
 }
@@ -68,11 +70,12 @@ WIENERTREE_CLONES double row_products(const double* t, const double* a, const do
 
 WIENERTREE_CLONES double row_bridge_variance(const double* t, std::size_t gaps) {
   double squares[lanes] = {}, cubes[lanes] = {}, square = 0, cube = 0;
-  for_gaps(gaps, [&] [[gnu::always_inline]] (std::size_t r, std::size_t lane) {
-    const double delta = t[r + 1] - t[r];
-    squares[lane] += delta * delta;
-    cubes[lane] += delta * delta * delta;
-  });
+  for_gaps(
+      gaps, [&](std::size_t r, std::size_t lane) __attribute__((always_inline)) {
+        const double delta = t[r + 1] - t[r];
+        squares[lane] += delta * delta;
+        cubes[lane] += delta * delta * delta;
+      });
   for (const double x : squares) square += x;
   for (const double x : cubes) cube += x;
   return square / 6 - cube / (12 * (t[gaps] - t[0]));

@@ -25,6 +25,11 @@ void WeightedFilter::advance(const ObservationWindow& window) {
   statistics_ = particles_.statistics();
 }
 
+void WeightedFilter::exchange_state(StateArchive& archive) {
+  particles_.exchange(archive);
+  archive(log_noise_);
+}
+
 // With mean m and effective size S, (1/N) sum L^2 = N m^2 / S.
 std::optional<LikelihoodRatio> WeightedFilter::likelihood_ratio() {
   const Posterior& p = particles_.posterior();

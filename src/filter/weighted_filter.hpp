@@ -28,6 +28,7 @@ class WeightedFilter final : public Filter {
   std::optional<LikelihoodRatio> likelihood_ratio() override;
 
  private:
+  void exchange_state(StateArchive& archive) override;
   std::shared_ptr<const ObservationDensity> density_;
   EulerFilter particles_;
   double log_noise_ = 0;  ///< log prod g(y_j)

@@ -16,9 +16,9 @@ struct NormalisedWeights {
   std::vector<double> weight;
   double log_mass = 0;
   double effective_size = 0;  ///< 1/sum weight^2
-  /// @param a N log-weights  @param b N, or empty for zeros  @param time for the message
+  /// @param a N log-weights  @param b N, or empty for zeros  @param step, time for the message
   /// @throws RunError if the weights are all zero, or one is NaN or +infinity: naming the node
-  void assign(std::span<const double> a, std::span<const double> b, double time);
+  void assign(std::span<const double> a, std::span<const double> b, std::size_t step, double time);
 };
 
 }  // namespace wienertree

@@ -178,10 +178,10 @@ bool SiteOrdering::make_axis(const Sites& sites, std::span<const std::uint32_t> 
 
 void SiteOrdering::line_items(const Sites& sites, std::span<const std::uint32_t> live) {
   const std::span<const double> x = sites.x.component(axes_[0].component);
-  const auto [component, low, scale] = axes_[0];
+  const auto axis = axes_[0];
   for_blocks(sites.threads, live.size(), block, [&](std::size_t first, std::size_t count, std::size_t) {
     for (std::size_t i = first; i < first + count; ++i)
-      items_[i] = packed_item(cell(x[live[i]], low, scale, 0x1.0p32), live[i]);
+      items_[i] = packed_item(cell(x[live[i]], axis.low, axis.scale, 0x1.0p32), live[i]);
   });
   sort_items(items_, scratch_, sites.threads);
   settle_equal_prefixes(

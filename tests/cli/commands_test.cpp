@@ -9,13 +9,6 @@ using cli::Workplace;
 
 namespace {
 
-std::string output_of(const Workplace& place, const std::string& arguments) {
-  const Outcome outcome = place.run(arguments);
-  INFO(arguments << "\n" << outcome.err);
-  REQUIRE(outcome.code == 0);
-  return outcome.out;
-}
-
 std::size_t occurrences(const std::string& text, const std::string& part) {
   std::size_t count = 0;
   for (std::size_t at = text.find(part); at != std::string::npos; at = text.find(part, at + 1)) ++count;

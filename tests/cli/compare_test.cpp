@@ -11,13 +11,6 @@ namespace {
 
 const std::string dax = "--observations " WIENERTREE_SOURCE_DIR "/data/observations/dax.csv ";
 
-std::string output_of(const Workplace& place, const std::string& arguments) {
-  const Outcome outcome = place.run(arguments);
-  INFO(arguments << "\n" << outcome.err);
-  REQUIRE(outcome.code == 0);
-  return outcome.out;
-}
-
 }  // namespace
 
 TEST_CASE("compare tells evidences, Bayes factors and probabilities of two parameter sets") {

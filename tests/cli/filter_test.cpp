@@ -1,13 +1,6 @@
 /// What `filter` tells: its table, its summary, its JSON, and that the same command gives the same bytes.
-#include <fcntl.h>
-#include <poll.h>
-#include <sys/wait.h>
-#include <unistd.h>
-
-#include <array>
 #include <catch2/catch.hpp>
 #include <cmath>
-#include <cstdio>
 #include <nlohmann/json.hpp>
 
 #include "program.hpp"
@@ -17,13 +10,6 @@ using cli::Outcome;
 using cli::Workplace;
 
 namespace {
-
-std::string output_of(const Workplace& place, const std::string& arguments) {
-  const Outcome outcome = place.run(arguments);
-  INFO(arguments << "\n" << outcome.err);
-  REQUIRE(outcome.code == 0);
-  return outcome.out;
-}
 
 std::string joined(const std::vector<std::string>& words) {
   std::string text;
@@ -225,43 +211,22 @@ TEST_CASE("standard input is filtered row by row, with the same numbers as a fil
   CHECK(cli::lines_of(outcome.out).size() == 3);
 }
 
-TEST_CASE("the posterior of a stream is written before the next row comes") {
-  std::array<int, 2> to{}, from{};
-  REQUIRE(::pipe(to.data()) == 0);
-  REQUIRE(::pipe(from.data()) == 0);
-  const pid_t child = ::fork();
-  REQUIRE(child >= 0);
-  if (child == 0) {
-    ::dup2(to[0], STDIN_FILENO);
-    ::dup2(from[1], STDOUT_FILENO);
-    for (const int end : {to[0], to[1], from[0], from[1]}) ::close(end);
-    ::execl(WIENERTREE_PROGRAM, "wienertree", "filter", "benes", "--observations", "-", "--quiet", nullptr);
-    ::_exit(127);
+TEST_CASE("filter reads standard input row by row and answers each row before the next") {
+  const Workplace place;
+  for (const char* command : {"filter benes --observations - --quiet", "filter benes - --quiet"}) {
+    cli::Running filter = place.start(command, true);
+    filter.tell("t,y1\n0,0\n");
+    CHECK_THAT(filter.read_line(), Catch::StartsWith("t,mean_x"));
+    CHECK_THAT(filter.read_line(), Catch::StartsWith("0,"));
+    filter.tell("0.5,0.25\n");
+    CHECK_THAT(filter.read_line(), Catch::StartsWith("0.5,"));
+    filter.tell("1,");
+    filter.tell("0.5\n");
+    CHECK_THAT(filter.read_line(), Catch::StartsWith("1,"));
+    filter.end_input();
+    CHECK(filter.read_line().empty());
+    CHECK(filter.finish().code == 0);
   }
-  ::close(to[0]);
-  ::close(from[1]);
-  const auto tell = [&](const std::string& text) {
-    REQUIRE(::write(to[1], text.data(), text.size()) == static_cast<ssize_t>(text.size()));
-  };
-  const auto read_line = [&] {
-    std::string line;
-    pollfd waiting{from[0], POLLIN, 0};
-    for (char c = 0; ::poll(&waiting, 1, 60000) == 1 && ::read(from[0], &c, 1) == 1 && c != '\n';) line += c;
-    return line;
-  };
-  tell("t,y1\n0,0\n");
-  CHECK_THAT(read_line(), Catch::StartsWith("t,mean_x"));
-  CHECK_THAT(read_line(), Catch::StartsWith("0,"));
-  tell("0.5,0.25\n");
-  CHECK_THAT(read_line(), Catch::StartsWith("0.5,"));
-  tell("1,0.5\n");
-  CHECK_THAT(read_line(), Catch::StartsWith("1,"));
-  ::close(to[1]);
-  CHECK(read_line().empty());
-  ::close(from[0]);
-  int status = 0;
-  ::waitpid(child, &status, 0);
-  CHECK((WIFEXITED(status) && WEXITSTATUS(status) == 0));
 }
 
 TEST_CASE("discrete observations: the Nile against the published Kalman filter") {
