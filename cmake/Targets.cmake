@@ -9,7 +9,8 @@ target_compile_options(wienertree_build_settings INTERFACE
   -Wall -Wextra -Wpedantic -Wconversion -Wshadow -Werror)
 if(WIENERTREE_SANITIZE)
   target_compile_options(wienertree_build_settings INTERFACE
-    -fsanitize=${WIENERTREE_SANITIZE} -fno-omit-frame-pointer -fno-sanitize-recover=all)
+    -fsanitize=${WIENERTREE_SANITIZE} -fno-omit-frame-pointer -fno-sanitize-recover=all
+    -Wno-maybe-uninitialized)  # which gcc 12 reports of its own std::regex once it is instrumented
   target_link_options(wienertree_build_settings INTERFACE -fsanitize=${WIENERTREE_SANITIZE})
 endif()
 
