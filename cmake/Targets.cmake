@@ -10,7 +10,7 @@ target_compile_options(wienertree_build_settings INTERFACE
 if(WIENERTREE_SANITIZE)
   target_compile_options(wienertree_build_settings INTERFACE
     -fsanitize=${WIENERTREE_SANITIZE} -fno-omit-frame-pointer -fno-sanitize-recover=all
-    -Wno-maybe-uninitialized)  # which gcc 12 reports of its own std::regex once it is instrumented
+    $<$<CXX_COMPILER_ID:GNU>:-Wno-maybe-uninitialized>)  # which gcc 12 reports of its own std::regex once it is instrumented
   target_link_options(wienertree_build_settings INTERFACE -fsanitize=${WIENERTREE_SANITIZE})
 endif()
 
