@@ -75,7 +75,7 @@ void draw_panel(Picture& picture, const std::vector<Contender>& contenders, cons
                       (panel.value[m].back() - panel.bottom) / (panel.top - panel.bottom)});
   }
   picture.add(fmt::format("set yrange [{:.9g}:{:.9g}]\nset ylabel {} noenhanced", panel.bottom, panel.top,
-                          app::quoted(panel.title)));
+                          app::in_quotes(panel.title)));
   picture.add(labels_at_right(std::move(labels), 18.0 / panel_height));
   picture.add(plot);
 }
@@ -101,8 +101,8 @@ std::string draw_comparison(Picture picture, const std::vector<Contender>& conte
   const int height = title_height + 2 * panel_height + axis_height;
   picture.begin(width, height);
   picture.add(fmt::format("set multiplot\nset label 1 {} at screen 0.5,{:.4f} center noenhanced",
-                          app::quoted("Bayes factors against " + contenders.front().label + ", " +
-                                      describe(contenders.front().setup)),
+                          app::in_quotes("Bayes factors against " + contenders.front().label + ", " +
+                                         describe(contenders.front().setup)),
                           1 - 0.55 * title_height / height));
   picture.add(fmt::format("set lmargin at screen {:.4f}\nset rmargin at screen {:.4f}",
                           static_cast<double>(left) / width, 1 - static_cast<double>(right) / width));

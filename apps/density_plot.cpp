@@ -58,7 +58,7 @@ std::string labels_of(const DensityPanel& panel, bool inside) {
   for (std::size_t i = 0; i < labels.size(); ++i)
     commands +=
         fmt::format("set label {} at graph 0.99,{:.3f} right textcolor rgb \"{}\" noenhanced font \",11\"\n",
-                    quoted(labels[i].text), 0.97 - 0.055 * static_cast<double>(i), labels[i].colour);
+                    in_quotes(labels[i].text), 0.97 - 0.055 * static_cast<double>(i), labels[i].colour);
   return commands;
 }
 
@@ -82,7 +82,7 @@ void draw_panel(Picture& picture, const DensityPanel& panel, std::size_t number,
   }
   picture.add(fmt::format(
       "set xrange [{:.9g}:{:.9g}]\nset yrange [0:{:.9g}]\nset xlabel {} noenhanced\nset ylabel \"density\"",
-      low, high, 1.12 * top, quoted(panel.state)));
+      low, high, 1.12 * top, in_quotes(panel.state)));
   picture.add(labels_of(panel, narrow));
   std::string plot = "plot ";
   for (std::size_t k = 0; k < pieces.size(); ++k) {
@@ -115,7 +115,7 @@ std::string draw_density(Picture picture, const std::string& title, const std::v
   const bool narrow = width < 640;
   picture.begin(width, height);
   picture.add(fmt::format("set label 1 {} at screen 0.5,{:.4f} center noenhanced font \",{}\"\nset multiplot",
-                          quoted(title), 1 - 0.55 * title_height / height, narrow ? 11 : 14));
+                          in_quotes(title), 1 - 0.55 * title_height / height, narrow ? 11 : 14));
   picture.add(fmt::format("set lmargin at screen {:.4f}\nset rmargin at screen {:.4f}",
                           (narrow ? 60.0 : 86.0) / width, 1 - (narrow ? 14.0 : 150.0) / width));
   for (int i = 0; i < count; ++i) {

@@ -139,7 +139,7 @@ std::string Picture::draw() const {
   return bytes;
 }
 
-std::string quoted(const std::string& text) {
+std::string in_quotes(const std::string& text) {
   std::string out = "\"";
   for (const char c : text) {
     if (c == '"' || c == '\\') out += '\\';
@@ -163,7 +163,7 @@ std::string labels_at_right(std::vector<SideLabel> labels, double spacing) {
   std::string commands;
   for (const SideLabel& label : labels)
     commands += fmt::format("set label {} at graph 1.012,{:.4f} left textcolor rgb \"{}\" noenhanced\n",
-                            quoted(label.text), label.y, label.colour);
+                            in_quotes(label.text), label.y, label.colour);
   return commands;
 }
 

@@ -39,7 +39,7 @@ class Picture {
 };
 
 /// Text between double quotes, for a place marked `noenhanced`.
-std::string quoted(const std::string& text);
+std::string in_quotes(const std::string& text);
 
 /// A text beside the place it names.
 struct SideLabel {

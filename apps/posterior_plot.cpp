@@ -82,7 +82,7 @@ std::string labels_of(const PosteriorPanel& panel, const Range& range, double sp
 void draw_panel(Picture& picture, const PosteriorPanel& panel, std::size_t number, int panel_height) {
   const Range range = range_of(panel);
   picture.add(fmt::format("set yrange [{:.9g}:{:.9g}]\nset ylabel {} noenhanced", range.low, range.high,
-                          quoted(panel.state)));
+                          in_quotes(panel.state)));
   picture.add(labels_of(panel, range, 18.0 / panel_height));
   const std::string id = fmt::format("panel{}", number);
   add_curves(picture, id, {&panel.filter.time, &panel.filter.low, &panel.filter.high, &panel.filter.mean});
@@ -116,7 +116,7 @@ std::string draw_posterior(Picture picture, const std::string& title,
   const int height = title_height + count * panel_height + axis_height;
   picture.begin(width, height);
   picture.add(fmt::format("set multiplot\nset label 1 {} at screen 0.5,{:.4f} center noenhanced",
-                          quoted(title), 1 - 0.55 * title_height / height));
+                          in_quotes(title), 1 - 0.55 * title_height / height));
   picture.add(fmt::format("set lmargin at screen {:.4f}\nset rmargin at screen {:.4f}", 94.0 / width,
                           1 - 136.0 / width));
   const std::vector<double>& time = panels.front().filter.time;

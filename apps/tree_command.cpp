@@ -2,6 +2,7 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <cmath>
 #include <cstdio>
 #include <memory>
 #include <sstream>
@@ -11,6 +12,7 @@
 #include "data_directory.hpp"
 #include "filter_arguments.hpp"
 #include "output.hpp"
+#include "tree_plot.hpp"
 #include "wienertree/model/text_model.hpp"
 #include "wienertree/tree/genealogy.hpp"
 #include "window_source.hpp"
@@ -24,7 +26,7 @@ struct TreeArguments {
   FilterArguments filter;
   std::optional<std::uint64_t> steps;
   std::optional<double> horizon;
-  std::optional<std::string> observations, dot, graphml;
+  std::optional<std::string> observations, dot, graphml, plot;
   bool quiet = false;
 };
 
@@ -67,17 +69,41 @@ void refuse_large_picture(const FilterSetup& setup, std::size_t steps) {
         "tree", fmt::format("{} steps", steps));
 }
 
+// log-likelihood of the last step per node kept: what its child's weight gained over that of its parent and
+// its path.
+std::vector<double> step_likelihoods(const Genealogy& genealogy, const Posterior& children,
+                                     const Generation& kept, const CubatureFormula& formula) {
+  const std::span<const double> before = genealogy.log_weights(genealogy.generations() - 1);
+  std::vector<double> gained(kept.size());
+  for (std::size_t n = 0; n < kept.size(); ++n) {
+    const std::size_t parent = kept.parent[n], branch = kept.branch[n];
+    gained[n] = std::log(children.weight[branch * before.size() + parent]) + children.log_evidence -
+                before[parent] - std::log(formula.paths[branch].weight);
+  }
+  return gained;
+}
+
 template <class Windows>
 Genealogy grow_tree(const Model& model, const FilterSetup& setup, Windows& windows) {
   refuse_large_picture(setup, windows.size());
   const auto filter = make_filter(model, setup.options);
   const bool counted = setup.random;
-  Genealogy genealogy({.states = true, .weights = true, .counts = counted}, model.state_names);
+  const bool observed = model.observation != ObservationKind::none;
+  Genealogy genealogy({.states = true, .weights = true, .counts = counted, .likelihoods = observed},
+                      model.state_names);
   for (ObservationWindow window; windows.next(window);) {
     // An observation at the start weighs the root before it grows.
-    if (window.length() > 0 && genealogy.generations() == 0) genealogy.append(*filter->generation());
+    if (window.length() > 0 && genealogy.generations() == 0) {
+      Generation root = *filter->generation();
+      root.time = window.start;
+      genealogy.append(root);
+    }
     filter->advance(window);
-    if (window.length() > 0) genealogy.append(*filter->generation());
+    if (window.length() == 0) continue;
+    const Generation& kept = *filter->generation();
+    genealogy.append(kept, observed
+                               ? step_likelihoods(genealogy, filter->posterior(), kept, setup.options.formula)
+                               : std::vector<double>());
   }
   return genealogy;
 }
@@ -87,6 +113,11 @@ void stage(OutputFile& file, const Genealogy& genealogy, Write write) {
   std::ostringstream text;
   write(text, genealogy);
   file.stage(text.str());
+}
+
+std::string title_of(const Model& model, const FilterSetup& setup, const TreeArguments& a) {
+  return fmt::format("{} on {}, {}", describe(setup), model.name,
+                     a.horizon ? "without observations" : *a.observations);
 }
 
 std::string summary(const Genealogy& genealogy) {
@@ -101,9 +132,10 @@ std::string summary(const Genealogy& genealogy) {
   return text;
 }
 
-void draw_tree(const TreeArguments& a) {
+void write_tree(const TreeArguments& a) {
   Model model = load_model(model_file(a.model).string(), a.parameters);
-  if (!a.dot && !a.graphml) throw InputError("give --dot, --graphml or both", "tree");
+  if (!a.dot && !a.graphml && !a.plot)
+    throw InputError("give one of --plot, --dot and --graphml, or several", "tree");
   if (a.horizon.has_value() == a.observations.has_value())
     throw InputError("give either --horizon (the signal alone) or --observations", "tree");
   if (a.horizon && !a.steps) throw InputError("is needed with --horizon", "--steps");
@@ -114,7 +146,12 @@ void draw_tree(const TreeArguments& a) {
   if (!arguments.nodes && arguments.thin != ThinningMethod::none) arguments.nodes = usual_nodes;
   if (a.horizon) model.observation = ObservationKind::none;
   const FilterSetup setup = filter_setup(arguments, model);
-  std::optional<OutputFile> dot, graphml;
+  std::optional<Picture> picture;
+  std::optional<OutputFile> dot, graphml, plot;
+  if (a.plot) {
+    picture.emplace(*a.plot);
+    plot.emplace("--plot", *a.plot);
+  }
   if (a.dot) dot.emplace("--dot", *a.dot);
   if (a.graphml) graphml.emplace("--graphml", *a.graphml);
 
@@ -131,8 +168,10 @@ void draw_tree(const TreeArguments& a) {
   }();
   if (dot) stage(*dot, genealogy, write_graphviz);
   if (graphml) stage(*graphml, genealogy, write_graphml);
+  if (plot) plot->stage(draw_tree(*picture, title_of(model, setup, a), genealogy));
   if (dot) dot->publish();
   if (graphml) graphml->publish();
+  if (plot) plot->publish();
   if (!a.quiet) std::fputs(summary(genealogy).c_str(), stderr);
 }
 
@@ -147,6 +186,8 @@ void add_tree_command(CLI::App& program) {
              "End of the time interval: the tree of the signal alone");
   add_text(app, "--observations", a->observations, "FILE", "CSV with header t,y1,..: the tree of the filter");
   add_count(app, "--steps", a->steps, 1, "Steps", 1'000'000);
+  add_text(app, "--plot", a->plot, "FILE",
+           "A picture, .svg or .png: nodes by time and state, sized by weight, coloured by likelihood");
   add_text(app, "--dot", a->dot, "FILE", "GraphViz; - is standard output");
   add_text(app, "--graphml", a->graphml, "FILE", "GraphML; - is standard output");
   add_tree_options(app, a->filter);
@@ -154,9 +195,8 @@ void add_tree_command(CLI::App& program) {
   app.add_flag("--quiet", a->quiet, "No summary");
   app.footer(
       "Thinning is tbba to 20 nodes if nothing else is asked for. Example:\n"
-      "  wienertree tree benes --horizon 2 --steps 6 --nodes 12 --dot tree.dot && dot -Tsvg tree.dot -o "
-      "tree.svg");
-  app.callback([a] { draw_tree(*a); });
+      "  wienertree tree benes --observations Y.csv --steps 20 --nodes 30 --plot tree.svg");
+  app.callback([a] { write_tree(*a); });
 }
 
 }  // namespace wienertree::app

@@ -28,6 +28,14 @@ function(wienertree_room name)
   target_link_libraries(wienertree_${name} PRIVATE $<BUILD_INTERFACE:wienertree_build_settings>)
 endfunction()
 
+# wienertree_known_leaks(<test>): what libraries keep until the end, and only that, is no leak to the address sanitizer.
+function(wienertree_known_leaks test)
+  if(WIENERTREE_SANITIZE MATCHES address)
+    set_tests_properties(${test} PROPERTIES ENVIRONMENT
+      "LSAN_OPTIONS=suppressions=${PROJECT_SOURCE_DIR}/tests/leaks.supp:print_suppressions=0")
+  endif()
+endfunction()
+
 # wienertree_test(<name> LIBS <targets>... SOURCES <files>... [LABELS <labels>...]): one Catch2 program, one ctest entry.
 function(wienertree_test name)
   cmake_parse_arguments(ARG "" "TIMEOUT" "LIBS;SOURCES;LABELS" ${ARGN})
@@ -35,6 +43,7 @@ function(wienertree_test name)
   target_link_libraries(test_${name} PRIVATE ${ARG_LIBS} wienertree_catch_main wienertree_build_settings)
   target_include_directories(test_${name} PRIVATE ${PROJECT_SOURCE_DIR}/tests)
   target_compile_definitions(test_${name} PRIVATE WIENERTREE_SOURCE_DIR="${PROJECT_SOURCE_DIR}")
+  target_precompile_headers(test_${name} REUSE_FROM wienertree_test_prelude)
   # Sanitizers are slow: statistics of the papers run without, and only what is threaded under the thread sanitizer.
   if((WIENERTREE_SANITIZE AND "papers" IN_LIST ARG_LABELS) OR
      (WIENERTREE_SANITIZE STREQUAL thread AND NOT "threads" IN_LIST ARG_LABELS))
@@ -42,10 +51,7 @@ function(wienertree_test name)
     return()
   endif()
   add_test(NAME ${name} COMMAND test_${name})
-  if(WIENERTREE_SANITIZE MATCHES address)
-    set_tests_properties(${name} PROPERTIES ENVIRONMENT
-      "LSAN_OPTIONS=suppressions=${PROJECT_SOURCE_DIR}/tests/leaks.supp:print_suppressions=0")
-  endif()
+  wienertree_known_leaks(${name})
   if(ARG_LABELS)
     set_tests_properties(${name} PROPERTIES LABELS "${ARG_LABELS}")
   endif()

@@ -182,8 +182,8 @@ std::string draw_study_plot(Picture picture, const StudyPlot& plot, const std::v
                   left / width, 1 - right / width, top, bottom));
   if (!plot.title.empty())
     picture.add(fmt::format("set label 1 {} at screen {:.4f},{:.4f} left noenhanced font \",{}\"",
-                            quoted(plot.title), wide ? left / width : 0.02, 1 - 0.5 * title_height / height,
-                            wide ? 15 : 12));
+                            in_quotes(plot.title), wide ? left / width : 0.02,
+                            1 - 0.5 * title_height / height, wide ? 15 : 12));
   if (plot.log_x) picture.add("set logscale x");
   if (plot.log_y) picture.add("set logscale y");
   picture.add(fmt::format("set xrange [{:.9g}:{:.9g}]\nset yrange [{:.9g}:{:.9g}]", frame.x.low, frame.x.high,
@@ -192,9 +192,10 @@ std::string draw_study_plot(Picture picture, const StudyPlot& plot, const std::v
   if (plot.log_y) picture.add("set ytics " + logarithmic_tics(frame.y, {}));
   picture.add("set grid xtics ytics lt 1 lw 0.6 lc rgb \"#E4E4E4\"");
   // The label of the axis at a place of its own: gnuplot's depends on the terminal's idea of the font.
-  picture.add(fmt::format("set label {} at screen {:.4f},{:.4f} center noenhanced", quoted(x_label(plot)),
+  picture.add(fmt::format("set label {} at screen {:.4f},{:.4f} center noenhanced", in_quotes(x_label(plot)),
                           (left + width - right) / 2 / width, static_cast<double>(key_height + 16) / height));
-  picture.add(fmt::format("set ylabel {} noenhanced{}", quoted(y_label(plot)), wide ? "" : " offset 1.5,0"));
+  picture.add(
+      fmt::format("set ylabel {} noenhanced{}", in_quotes(y_label(plot)), wide ? "" : " offset 1.5,0"));
   std::vector<SideLabel> labels;
   for (std::size_t i = 0; i < lines.size(); ++i) {
     const Style& style = styles[i % styles.size()];
@@ -209,7 +210,7 @@ std::string draw_study_plot(Picture picture, const StudyPlot& plot, const std::v
         fmt::format("set label {} at screen 0.07,{:.4f} left textcolor rgb \"{}\" noenhanced font \",12\" "
                     "point pt {} ps 0.8 lc "
                     "rgb \"{}\" offset 1.2,0",
-                    quoted(text_of(lines[i])), y, style.colour, style.point, style.colour));
+                    in_quotes(text_of(lines[i])), y, style.colour, style.point, style.colour));
   }
   if (wide) picture.add(labels_at_right(std::move(labels), 19.0 / (height - title_height - 64)));
   std::vector<std::string> pieces;

@@ -28,10 +28,13 @@ struct DiscoveryVisitor : boost::default_bfs_visitor {
 Genealogy::Genealogy(KeptAttributes kept, std::vector<std::string> state_names)
     : kept_(kept), state_names_(std::move(state_names)) {}
 
-void Genealogy::append(const Generation& generation) {
+void Genealogy::append(const Generation& generation, std::span<const double> log_likelihood) {
   const std::size_t n = generation.size();
   const std::string where = fmt::format("genealogy, generation {}", generations());
   if (n == 0) throw InputError("a generation has no nodes", where);
+  if (!log_likelihood.empty() && log_likelihood.size() != n)
+    throw InputError(fmt::format("{} nodes need a likelihood each", n), where,
+                     fmt::format("{}", log_likelihood.size()));
   Level level;
   level.time = generation.time;
   level.size = n;
@@ -54,6 +57,7 @@ void Genealogy::append(const Generation& generation) {
       std::ranges::copy(generation.states.component(c), level.states.component(c).begin());
   }
   if (kept_.counts) level.count = generation.count;
+  if (kept_.likelihoods) level.log_likelihood.assign(log_likelihood.begin(), log_likelihood.end());
   if (kept_.weights) {
     level.log_weight = generation.log_weight;
     for (std::size_t i = 0; i < generation.log_likelihood.size(); ++i)

@@ -26,6 +26,7 @@ struct KeptAttributes {
   bool states = false;
   bool weights = false;  ///< log_weight + log_likelihood
   bool counts = false;
+  bool likelihoods = false;  ///< what `append` is told of them
 };
 
 /// Records generations as they come. A value: it can be copied, and is complete at any moment.
@@ -35,8 +36,10 @@ class Genealogy {
   explicit Genealogy(KeptAttributes kept = {}, std::vector<std::string> state_names = {});
 
   /// The first generation recorded is the root, whatever its parents.
-  /// @throws InputError if the generation is empty, or a node's parent is not a node of the generation before
-  void append(const Generation& generation);
+  /// @param log_likelihood of the observations of the step that led to each node; empty if there are none
+  /// @throws InputError if the generation is empty, if a node's parent is not a node of the generation
+  /// before, or if there are likelihoods, but not one a node
+  void append(const Generation& generation, std::span<const double> log_likelihood = {});
 
   std::size_t generations() const { return levels_.size(); }
   std::size_t size(std::size_t generation) const { return levels_[generation].size; }
@@ -51,10 +54,13 @@ class Genealogy {
   std::span<const std::uint32_t> parents(std::size_t generation) const { return levels_[generation].parent; }
   /// Path of the formula, per node; empty for the root.
   std::span<const std::uint16_t> branches(std::size_t generation) const { return levels_[generation].branch; }
-  /// d x size, log-weights, particles; empty unless kept (and counted).
+  /// d x size, log-weights, particles, log-likelihoods; empty unless kept (and counted, and told).
   ConstBatchView states(std::size_t generation) const { return levels_[generation].states.view(); }
   std::span<const double> log_weights(std::size_t generation) const { return levels_[generation].log_weight; }
   std::span<const std::uint32_t> counts(std::size_t generation) const { return levels_[generation].count; }
+  std::span<const double> log_likelihoods(std::size_t generation) const {
+    return levels_[generation].log_likelihood;
+  }
   const std::vector<std::string>& state_names() const { return state_names_; }
 
  private:
@@ -63,7 +69,7 @@ class Genealogy {
     std::size_t size = 0, before = 0;
     std::vector<std::uint32_t> parent, count;
     std::vector<std::uint16_t> branch;
-    std::vector<double> log_weight;
+    std::vector<double> log_weight, log_likelihood;
     Batch states;
   };
   KeptAttributes kept_;
@@ -90,8 +96,8 @@ std::vector<double> ancestral_weights(const Genealogy& genealogy, std::span<cons
                                       std::size_t generation);
 
 /// The tree with its edges from parent to child as DOT or GraphML. Nodes carry `time` and, as far as kept,
-/// the states under their names, `weight` (share of the generation's mass) and `count` (GraphML: 0 where a
-/// generation was not counted); edges carry `branch`.
+/// the states under their names, `weight` (share of the generation's mass), `count` and `log_likelihood`
+/// (GraphML: 0 where a generation has none); edges carry `branch`.
 void write_graphviz(std::ostream& out, const Genealogy& genealogy);
 void write_graphml(std::ostream& out, const Genealogy& genealogy);
 

@@ -83,6 +83,7 @@ void write_graphviz(std::ostream& out, const Genealogy& g) {
       add("count", fmt::format("{}", g.counts(j)[i]));
       label += fmt::format("{}({})", label.empty() ? "" : " ", g.counts(j)[i]);
     }
+    if (!g.log_likelihoods(j).empty()) add("log_likelihood", fmt::format("{}", g.log_likelihoods(j)[i]));
     o << "[label=" << boost::escape_dot_string(label) << ", " << attributes << "]";
   };
   const auto edge_attributes = [&](std::ostream& o, const GenealogyEdge& edge) {
@@ -104,12 +105,20 @@ void write_graphml(std::ostream& out, const Genealogy& g) {
     add_attribute<NodeId>(properties, "weight", [&](NodeId n) {
       return std::exp(g.log_weights(generation_of(n))[index_of(n)] - log_mass[generation_of(n)]);
     });
-  bool counted = false;
-  for (std::size_t j = 0; j < g.generations(); ++j) counted |= !g.counts(j).empty();
+  bool counted = false, likely = false;
+  for (std::size_t j = 0; j < g.generations(); ++j) {
+    counted |= !g.counts(j).empty();
+    likely |= !g.log_likelihoods(j).empty();
+  }
   if (counted)
     add_attribute<NodeId>(properties, "count", [&g](NodeId n) {
       const auto counts = g.counts(generation_of(n));
       return counts.empty() ? std::uint32_t{0} : counts[index_of(n)];
+    });
+  if (likely)
+    add_attribute<NodeId>(properties, "log_likelihood", [&g](NodeId n) {
+      const auto likelihoods = g.log_likelihoods(generation_of(n));
+      return likelihoods.empty() ? 0.0 : likelihoods[index_of(n)];
     });
   add_attribute<GenealogyEdge>(properties, "branch",
                                [&g](const GenealogyEdge& e) { return branch_of(g, e.target); });

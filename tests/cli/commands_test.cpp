@@ -1,6 +1,9 @@
 /// formulas, model, tree, pictures, help: each does what its help says.
 #include <catch2/catch.hpp>
+#include <cmath>
+#include <map>
 #include <nlohmann/json.hpp>
+#include <regex>
 
 #include "program.hpp"
 
@@ -82,6 +85,54 @@ TEST_CASE("the tree is written as GraphViz and GraphML") {
   cli::simulate_benes(place);
   CHECK_THAT(output_of(place, "tree benes --observations Y.csv --steps 6 --dot -"),
              Catch::Contains("digraph"));
+}
+
+TEST_CASE("likelihoods of the steps and weights of the formula make the weights of the whole tree") {
+  const Workplace place;
+  cli::simulate_benes(place);
+  const std::string dot = output_of(place,
+                                    "tree benes --observations Y.csv --steps 4 --thin none --formula "
+                                    "lyons-victoir-5-1 --quiet --dot -");
+  const std::vector<double> lambda = {1.0 / 6, 2.0 / 3, 1.0 / 6};
+  struct Node {
+    double time = 0, weight = 1, log_likelihood = 0;
+  };
+  std::vector<Node> nodes;
+  std::vector<double> path_weight;
+  const std::regex node(R"(\d+\[.*time=([^,]*),.*weight=([^,\]]*)(?:, log_likelihood=([^\]]*))?\];)");
+  const std::regex edge(R"((\d+)->(\d+) \[branch=(\d+)\];)");
+  std::map<double, double> mass;
+  for (std::string line : cli::lines_of(dot)) {
+    std::erase(line, '"');
+    std::smatch part;
+    if (std::regex_match(line, part, node)) {
+      nodes.push_back({std::stod(part[1]), std::stod(part[2]), part[3].matched ? std::stod(part[3]) : 0});
+      path_weight.push_back(nodes.size() == 1 ? 1 : 0);
+    } else if (std::regex_match(line, part, edge)) {
+      const std::size_t from = std::stoul(part[1]), to = std::stoul(part[2]);
+      path_weight[to] = path_weight[from] * lambda[std::stoul(part[3])] * std::exp(nodes[to].log_likelihood);
+      mass[nodes[to].time] += path_weight[to];
+    }
+  }
+  REQUIRE(nodes.size() == 1 + 3 + 9 + 27 + 81);
+  for (std::size_t n = 1; n < nodes.size(); ++n)
+    REQUIRE(nodes[n].weight == Approx(path_weight[n] / mass[nodes[n].time]).epsilon(1e-10));
+}
+
+TEST_CASE("the tree is drawn from the start of the record on") {
+  const Workplace place;
+  cli::simulate_benes(place);
+  place.write("late.csv", "t,y1\n100,0\n100.5,0.3\n101,0.2\n101.5,0.4\n");
+  output_of(place, "tree benes --observations late.csv --plot t.svg --dot t.dot --quiet");
+  CHECK_THAT(place.read("t.dot"),
+             Catch::Contains("0[label=\"0 (1)\", time=100,") || Catch::Contains("0[label=0, time=100,"));
+  for (const char* part : {"</svg>", "KLV filter", "likelihood", "late.csv"})
+    CHECK_THAT(place.read("t.svg"), Catch::Contains(part));
+  output_of(place, "tree linear-3d --horizon 1 --steps 3 --plot bare.png");
+  CHECK(place.read("bare.png").substr(1, 3) == "PNG");
+  const Outcome nothing = place.run("tree benes --horizon 1 --steps 3");
+  CHECK(nothing.code == 2);
+  CHECK_THAT(nothing.err, Catch::Contains("--plot"));
 }
 
 TEST_CASE("pictures are drawn as SVG and PNG") {

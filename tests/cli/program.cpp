@@ -77,9 +77,9 @@ Running Workplace::start(const std::string& arguments, bool by_pipes) const {
   const std::string in = (captured / "in").string(), out = (captured / "out").string(),
                     err = (captured / "err").string();
   running.captured_->write("in", input);
+  std::string program = WIENERTREE_PROGRAM;
   std::vector<std::string> words = split(arguments, ' ');
-  words.insert(words.begin(), WIENERTREE_PROGRAM);
-  std::vector<char*> argv;
+  std::vector<char*> argv = {program.data()};
   for (std::string& word : words) argv.push_back(word.data());
   argv.push_back(nullptr);
   int to[2] = {-1, -1}, from[2] = {-1, -1};

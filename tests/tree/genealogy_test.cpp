@@ -130,6 +130,8 @@ TEST_CASE("Histories that are none are refused") {
   Generation orphan = generation(1, {0, 1});
   orphan.parent.clear();
   CHECK_THROWS_AS(history.append(orphan), InputError);
+  CHECK_THROWS_WITH(history.append(generation(1, {0, 1}), std::vector{0.0}),
+                    Catch::Contains("likelihood") && Catch::Contains("(1)"));
   CHECK(history.generations() == 1);
   CHECK_THROWS_AS(ancestral_line(history, node_id(0, 2)), InputError);
   CHECK_THROWS_AS(ancestral_line(history, node_id(1, 0)), InputError);
@@ -178,14 +180,14 @@ TEST_CASE("As a graph: every node once, every edge to the parent, and back in th
 }
 
 TEST_CASE("Written as DOT and GraphML with all attributes") {
-  Genealogy history({.states = true, .weights = true, .counts = true}, {"x\"y"});
+  Genealogy history({.states = true, .weights = true, .counts = true, .likelihoods = true}, {"x\"y"});
   Generation root = generation(0, {0}), next = generation(0.1, {0, 0});
   next.count = {3, 1};
   next.log_weight = {0.0, -1e6};
   next.log_likelihood = {0.0, 1e6};
   next.states(0, 0) = 1.0 / 3;
   history.append(root);
-  history.append(next);
+  history.append(next, std::vector{-0.5, -2.0});
   std::ostringstream dot;
   write_graphviz(dot, history);
   CHECK(dot.str() ==
@@ -193,8 +195,9 @@ TEST_CASE("Written as DOT and GraphML with all attributes") {
         "rankdir=LR;\n"
         "0[label=0, time=0, \"x\\\"y\"=0, weight=1];\n"
         "1[label=\"0.3333 (3)\", time=0.1, \"x\\\"y\"=0.3333333333333333, "
-        "weight=0.5, count=3];\n"
-        "2[label=\"0.2 (1)\", time=0.1, \"x\\\"y\"=0.2, weight=0.5, count=1];\n"
+        "weight=0.5, count=3, log_likelihood=-0.5];\n"
+        "2[label=\"0.2 (1)\", time=0.1, \"x\\\"y\"=0.2, weight=0.5, count=1, "
+        "log_likelihood=-2];\n"
         "0->1 [branch=0];\n"
         "0->2 [branch=1];\n"
         "}\n");
