@@ -5,12 +5,14 @@
 #include <memory>
 #include <set>
 
+#include "checksum.hpp"
 #include "command_line.hpp"
 #include "commands.hpp"
 #include "compare_plot.hpp"
 #include "compare_run.hpp"
 #include "data_directory.hpp"
 #include "output.hpp"
+#include "wienertree/cubature/formula_file.hpp"
 #include "wienertree/model/text_model.hpp"
 #include "wienertree/version.hpp"
 
@@ -26,6 +28,7 @@ struct CompareArguments {
   std::optional<std::string> observations, output, plot;
   std::optional<TableFormat> format;
   std::optional<std::uint64_t> steps;
+  CheckpointArguments saving;
   bool quiet = false;
 };
 
@@ -68,7 +71,7 @@ std::vector<Contender> contenders(const CompareArguments& a) {
                          model.observation_dimension() != all.front().model.observation_dimension()))
       throw InputError("models to be compared must observe the same: kind and number of components",
                        "model " + text);
-    all.push_back({text, std::move(model), {}});
+    all.push_back({text, argument.name, std::move(model), {}});
     all.back().setup = filter_setup(a.filter, all.back().model);
   }
   return all;
@@ -147,6 +150,21 @@ std::string summary_of(const CompareArguments& a, const std::vector<Contender>& 
   return text;
 }
 
+// Everything the table depends on.
+Json identity_of(const std::vector<Contender>& all, const WindowSource& windows) {
+  Json run = run_identity("compare");
+  run["observations"] = windows.identity();
+  for (const Contender& c : all) {
+    Json model = model_identity(c.file, c.model);
+    model["label"] = c.label;
+    model["options"] = options_in_force(c.setup, c.model);
+    if (!c.setup.options.formula.paths.empty())
+      model["formula's checksum"] = checksum_text(format_formula(c.setup.options.formula));
+    run["models"].push_back(std::move(model));
+  }
+  return run;
+}
+
 void compare_and_write(const CompareArguments& a) {
   std::vector<Contender> all = contenders(a);
   if (*a.observations == "-") throw InputError("needs a file: every model reads it", "--observations", "-");
@@ -157,7 +175,10 @@ void compare_and_write(const CompareArguments& a) {
     plot.emplace("--plot", *a.plot);
   }
   OutputFile output("--output", a.output.value_or("-"));
-  const std::vector<ComparisonRow> rows = compare(all, *a.observations, a.steps, !a.quiet);
+  std::vector<std::unique_ptr<WindowSource>> windows;
+  for (const Contender& c : all) windows.push_back(open_windows(*a.observations, c.model, a.steps));
+  SavedRun saved(a.saving, identity_of(all, *windows.front()));
+  const std::vector<ComparisonRow> rows = compare(all, windows, !a.quiet, saved);
   const bool several = all.front().setup.launches > 1;
   Table table{columns(all, several), {}};
   for (const ComparisonRow& row : rows) table.rows.push_back(row_of(row, several));
@@ -186,6 +207,7 @@ void add_compare_command(CLI::App& program) {
   add_choice(app, "--format", a->format, formats, "Of the table [csv]");
   add_text(app, "--plot", a->plot, "FILE",
            "A picture of log Bayes factors and probabilities through time, .svg or .png");
+  add_checkpoint_options(app, a->saving);
   app.add_flag("--quiet", a->quiet, "No summary and no progress bar");
   app.footer(
       "Example:\n"

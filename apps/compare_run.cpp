@@ -11,12 +11,6 @@
 namespace wienertree::app {
 namespace {
 
-// One model on its way through the record.
-struct Lane {
-  std::unique_ptr<WindowSource> windows;
-  Launches filters;
-};
-
 // The error of the logarithm of an average of M: sd(Z)/(mean(Z) sqrt(M)), from the launches' Z relative to
 // their mean.
 double standard_error(const std::vector<double>& log_evidence, double log_mean) {
@@ -36,37 +30,46 @@ std::vector<double> ComparisonRow::probabilities() const {
   return p;
 }
 
-std::vector<ComparisonRow> compare(const std::vector<Contender>& contenders, const std::string& observations,
-                                   std::optional<std::size_t> steps, bool show_progress) {
+std::vector<ComparisonRow> compare(const std::vector<Contender>& contenders,
+                                   const std::vector<std::unique_ptr<WindowSource>>& windows,
+                                   bool show_progress, SavedRun& saved) {
+  const std::size_t models = contenders.size(), steps = windows.front()->size();
+  const bool starts_before = !windows.front()->observed_at_start();
+  const std::vector<double> zeros(models, 0.0);
   std::vector<ComparisonRow> rows;
-  std::size_t total = 0, done = 0;
-  std::optional<Progress> progress;
-  for (std::size_t m = 0; m < contenders.size(); ++m) {
-    const Contender& c = contenders[m];
-    Lane lane{open_windows(observations, c.model, steps), Launches(c.model, c.setup)};
-    refuse_oversized_tree(c.model, c.setup.options, lane.windows->size());
-    if (m == 0) {
-      total = lane.windows->size() * contenders.size();
-      progress.emplace("compare", total, show_progress);
-      if (!lane.windows->observed_at_start())
-        rows.push_back({lane.windows->start(), std::vector(contenders.size(), 0.0),
-                        std::vector(contenders.size(), 0.0)});
-    }
-    std::size_t row = rows.empty() || lane.windows->observed_at_start() ? 0 : 1;
-    for (ObservationWindow window; lane.windows->next(window); ++row) {
-      lane.filters.advance(window);
-      progress->advance_to(++done);
-      if (m == 0)
-        rows.push_back(
-            {window.end, std::vector(contenders.size(), 0.0), std::vector(contenders.size(), 0.0)});
-      if (row >= rows.size() || rows[row].time != window.end)
-        throw InputError("steps to other times than the first model: their timing differs",
-                         "model " + c.label, fmt::format("t = {:g}", window.end));
-      const std::vector<double> log_evidence = lane.filters.log_evidences();
-      rows[row].log_evidence[m] = log_average(log_evidence);
-      rows[row].standard_error[m] = standard_error(log_evidence, rows[row].log_evidence[m]);
-    }
+  if (starts_before) rows.push_back({windows.front()->start(), zeros, zeros});
+  const std::size_t first = rows.size();
+  std::vector<Launches> filters;
+  for (std::size_t m = 0; m < models; ++m) {
+    refuse_oversized_tree(contenders[m].model, contenders[m].setup.options, windows[m]->size());
+    filters.emplace_back(contenders[m].model, contenders[m].setup);
   }
+  const Exchange exchange = [&](StateArchive& archive) {
+    archive(rows);
+    for (std::size_t m = 0; m < models; ++m) {
+      windows[m]->exchange(archive);
+      filters[m].exchange(archive);
+    }
+  };
+  saved.resume(exchange);
+  Progress progress("compare", steps, show_progress);
+  while (rows.size() - first < steps && !saved.interrupted()) {
+    for (std::size_t m = 0; m < models; ++m) {
+      ObservationWindow window;
+      const bool there = windows[m]->next(window);
+      if (m == 0) rows.push_back({window.end, zeros, zeros});
+      if (!there || rows.back().time != window.end)
+        throw InputError("steps to other times than the first model: their timing differs",
+                         "model " + contenders[m].label, fmt::format("t = {:g}", rows.back().time));
+      filters[m].advance(window);
+      const std::vector<double> log_evidence = filters[m].log_evidences();
+      rows.back().log_evidence[m] = log_average(log_evidence);
+      rows.back().standard_error[m] = standard_error(log_evidence, rows.back().log_evidence[m]);
+    }
+    progress.advance_to(rows.size() - first);
+    saved.after_step(exchange);
+  }
+  saved.finish(exchange, fmt::format("t = {:g}", rows.back().time));
   return rows;
 }
 

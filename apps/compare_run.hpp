@@ -1,15 +1,18 @@
 #pragma once
 /// The evidence of several models through time.
-#include <optional>
+#include <memory>
 #include <string>
 #include <vector>
 
 #include "filter_arguments.hpp"
+#include "saved_run.hpp"
+#include "window_source.hpp"
 
 namespace wienertree::app {
 
 struct Contender {
   std::string label;  ///< as given on the command line
+  std::string file;   ///< the model's name or path, without parameters
   Model model;
   FilterSetup setup;
 };
@@ -23,12 +26,17 @@ struct ComparisonRow {
   double log_bayes_factor(std::size_t m) const { return log_evidence[m] - log_evidence[0]; }
   /// Of the models given the observations, if they were equally probable before.
   std::vector<double> probabilities() const;
+  void exchange(StateArchive& archive) { archive(time, log_evidence, standard_error); }
 };
 
 /// Rows are times that all models step to. Launches of different models use the same seed, but their errors
 /// are not taken to cancel.
-/// @throws InputError, RunError as filters do, naming the model
-std::vector<ComparisonRow> compare(const std::vector<Contender>& contenders, const std::string& observations,
-                                   std::optional<std::size_t> steps, bool show_progress);
+/// @param windows the same observations for each contender
+/// @throws InputError naming the model whose steps end at other times than those of the first; RunError as
+/// filters do; Interrupted if a noted interruption ended it,
+/// its checkpoint being written
+std::vector<ComparisonRow> compare(const std::vector<Contender>& contenders,
+                                   const std::vector<std::unique_ptr<WindowSource>>& windows,
+                                   bool show_progress, SavedRun& saved);
 
 }  // namespace wienertree::app

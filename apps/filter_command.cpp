@@ -2,11 +2,8 @@
 
 #include <chrono>
 #include <cstdio>
-#include <fstream>
 #include <memory>
-#include <sstream>
 
-#include "checkpoint.hpp"
 #include "checksum.hpp"
 #include "command_line.hpp"
 #include "commands.hpp"
@@ -17,7 +14,6 @@
 #include "signal_file.hpp"
 #include "wienertree/cubature/formula_file.hpp"
 #include "wienertree/model/text_model.hpp"
-#include "wienertree/version.hpp"
 
 namespace wienertree::app {
 namespace {
@@ -31,8 +27,8 @@ struct FilterCommandArguments {
   std::optional<std::string> observations, signal, output, plot;
   std::optional<TableFormat> format;
   std::optional<std::uint64_t> moments, steps;
-  std::optional<double> density_at, checkpoint_every;
-  std::optional<std::string> checkpoint, resume;
+  std::optional<double> density_at;
+  CheckpointArguments saving;
   bool quiet = false;
 };
 
@@ -75,17 +71,10 @@ std::string draw(Picture picture, const FilterContext& c, const FilterRun& run,
   return draw_posterior(std::move(picture), what, panels);
 }
 
-// What makes it this run: everything its results depend on.
+// Everything its results depend on.
 Json identity_of(const FilterCommandArguments& a, const FilterContext& c, bool follow) {
-  std::ifstream in(model_file(a.model), std::ios::binary);
-  std::ostringstream model_text;
-  model_text << in.rdbuf();
-  Json run;
-  run["program"] = "wienertree " WIENERTREE_VERSION;
-  run["command"] = "filter";
-  run["model"] = c.model.name;
-  run["model file's checksum"] = checksum_text(model_text.str());
-  for (const auto& [name, value] : c.model.parameters) run["parameters"][name] = value;
+  Json run = run_identity("filter");
+  run.update(model_identity(a.model, c.model));
   run["observations"] = c.windows.identity();
   run["options"] = options_in_force(c.setup, c.model);
   if (!c.setup.options.formula.paths.empty())
@@ -108,8 +97,6 @@ void filter_and_write(const FilterCommandArguments& a) {
     throw InputError("is drawn to the file of --plot, which is missing", "--density-at");
   if (a.signal && !a.plot)
     throw InputError("is drawn to the file of --plot, which is missing", "--signal", *a.signal);
-  if (a.checkpoint_every && !a.checkpoint)
-    throw InputError("is the time between two of --checkpoint, which is missing", "--checkpoint-every");
   std::optional<Picture> picture;
   std::optional<OutputFile> plot;
   if (a.plot) {
@@ -119,7 +106,7 @@ void filter_and_write(const FilterCommandArguments& a) {
   OutputFile output("--output", a.output.value_or("-"));
   std::optional<ObservationPath> signal;
   if (a.signal) signal = read_signal(*a.signal, model);
-  const auto windows = open_windows(*a.observations, model, a.steps, a.resume.has_value());
+  const auto windows = open_windows(*a.observations, model, a.steps, a.saving.resume.has_value());
 
   const int highest_moment = static_cast<int>(a.moments.value_or(0));
   const FilterContext context{model, setup, *windows, *a.observations, highest_moment};
@@ -132,17 +119,13 @@ void filter_and_write(const FilterCommandArguments& a) {
   request.progress = !a.quiet;
   request.keep_rows = !follow || a.plot;
   request.keep_exact_rows = a.plot.has_value();
-  std::optional<Checkpoint> checkpoint;
-  if (a.checkpoint)
-    checkpoint.emplace(*a.checkpoint, a.checkpoint_every.value_or(5), identity_of(a, context, follow));
-  if (checkpoint) request.checkpoint = &*checkpoint;
-  if (a.resume) request.resume = read_checkpoint(*a.resume, identity_of(a, context, follow));
+  SavedRun saved(a.saving, identity_of(a, context, follow));
   const std::vector<std::string> columns = filter_columns(model, setup, highest_moment);
   if (follow) {
-    if (!a.resume) write_to_stdout(csv_header(columns));
+    if (!saved.resumes()) write_to_stdout(csv_header(columns));
     request.observe = [](const std::vector<double>& row) { write_to_stdout(csv_row(row)); };
   }
-  FilterRun run = run_filter(model, setup, *windows, request);
+  FilterRun run = run_filter(model, setup, *windows, request, saved);
   if (plot) plot->stage(draw(*picture, context, run, signal));
   if (!follow) {
     const Table table{columns, std::move(run.rows)};
@@ -176,11 +159,7 @@ void add_filter_command(CLI::App& program) {
   add_text(app, "--plot", a->plot, "FILE", "A picture of mean and 5-95 % band, .svg or .png");
   add_number(app, "--density-at", a->density_at, Sign::any, "Draw the law at this time instead");
   add_text(app, "--signal", a->signal, "FILE", "The true signal (CSV t,<state>,..), to be drawn as well");
-  add_text(app, "--checkpoint", a->checkpoint, "FILE",
-           "Save the run here now and then, on SIGTERM and SIGINT, and at its end");
-  add_number(app, "--checkpoint-every", a->checkpoint_every, Sign::positive,
-             "Seconds between two checkpoints [5]");
-  add_text(app, "--resume", a->resume, "FILE", "Go on from a checkpoint of this same run");
+  add_checkpoint_options(app, a->saving);
   app.add_flag("--quiet", a->quiet, "No summary and no progress bar");
   app.footer(
       "Example:\n"

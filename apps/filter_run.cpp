@@ -6,7 +6,6 @@
 #include <cmath>
 
 #include "filter_table.hpp"
-#include "interruption.hpp"
 #include "progress.hpp"
 
 namespace wienertree::app {
@@ -105,41 +104,26 @@ void check_density_time(const FilterRequest& request, const WindowSource& window
 }  // namespace
 
 FilterRun run_filter(const Model& model, const FilterSetup& setup, WindowSource& windows,
-                     const FilterRequest& request) {
+                     const FilterRequest& request, SavedRun& saved) {
   SideBySide filters(model, setup, request);
-  const auto exchange = [&](StateArchive& archive) {
+  const Exchange exchange = [&](StateArchive& archive) {
     windows.exchange(archive);
     filters.exchange(archive);
   };
-  if (request.resume) {
-    StateArchive archive(*request.resume);
-    exchange(archive);
-    archive.finish();
-  }
-  const auto save = [&] {
-    StateArchive archive;
-    exchange(archive);
-    request.checkpoint->write(archive.bytes());
-  };
+  saved.resume(exchange);
   check_density_time(request, windows);
   refuse_oversized_tree(model, setup.options, windows.size());
-  std::optional<DeferredInterruption> deferred;
-  if (request.checkpoint != nullptr) deferred.emplace();
-  if (!request.resume && !windows.observed_at_start()) filters.record(windows.start());
+  if (!saved.resumes() && !windows.observed_at_start()) filters.record(windows.start());
   {
     Progress progress("filter", windows.size(), request.progress);
-    for (ObservationWindow window; noted_interruption() == 0 && windows.next(window);) {
+    for (ObservationWindow window; !saved.interrupted() && windows.next(window);) {
       filters.advance(window);
       filters.record(window.end);
       progress.advance_to(window.step);
-      if (request.checkpoint != nullptr && request.checkpoint->due()) save();
+      saved.after_step(exchange);
     }
   }
-  if (request.checkpoint != nullptr) save();
-  if (const int signal = noted_interruption(); signal != 0)
-    throw Interrupted(fmt::format("stopped at t = {:g}; --resume {} goes on from there", filters.time(),
-                                  request.checkpoint->file()),
-                      signal);
+  saved.finish(exchange, fmt::format("t = {:g}", filters.time()));
   FilterRun run = filters.finish();
   if (request.density_at && run.density.empty())
     throw InputError("the observations end before this time", "--density-at",

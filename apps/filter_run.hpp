@@ -5,9 +5,9 @@
 #include <string>
 #include <vector>
 
-#include "checkpoint.hpp"
 #include "density_plot.hpp"
 #include "launches.hpp"
+#include "saved_run.hpp"
 #include "window_source.hpp"
 
 namespace wienertree::app {
@@ -19,9 +19,7 @@ struct FilterRequest {
   bool keep_rows = true;        ///< for a table or a picture afterwards; else memory does not grow with steps
   bool keep_exact_rows = true;  ///< for a picture
   std::function<void(const std::vector<double>&)>
-      observe;                        ///< called with each row as it comes; may be empty
-  Checkpoint* checkpoint = nullptr;   ///< written when due, when interrupted, and at the end
-  std::optional<std::string> resume;  ///< the state to go on from
+      observe;  ///< called with each row as it comes; may be empty
 };
 
 struct FilterRun {
@@ -38,6 +36,6 @@ struct FilterRun {
 /// @throws InputError if the observations end before `density_at` or a row cannot be read; RunError as
 /// Filter::advance; Interrupted if a noted interruption ended it, its checkpoint being written
 FilterRun run_filter(const Model& model, const FilterSetup& setup, WindowSource& windows,
-                     const FilterRequest& request);
+                     const FilterRequest& request, SavedRun& saved);
 
 }  // namespace wienertree::app

@@ -6,10 +6,13 @@
 #include <cstdio>
 #include <memory>
 
+#include "checksum.hpp"
 #include "commands.hpp"
 #include "output.hpp"
 #include "progress.hpp"
+#include "saved_run.hpp"
 #include "weak_outcome.hpp"
+#include "wienertree/cubature/formula_file.hpp"
 #include "wienertree/version.hpp"
 
 namespace wienertree::app {
@@ -21,6 +24,7 @@ struct WeakCommandArguments {
   WeakArguments weak;
   std::optional<std::string> output;
   std::optional<TableFormat> format;
+  CheckpointArguments saving;
   bool quiet = false;
 };
 
@@ -73,24 +77,65 @@ std::string summary_of(const WeakArguments& a, const WeakProblem& problem, const
   return text;
 }
 
+// Everything the values depend on: the options as they were given, for --tolerance chooses others as it goes.
+Json identity_of(const WeakArguments& a, const WeakProblem& problem) {
+  Json run = run_identity("weak");
+  run.update(model_identity(a.model, problem.source.model()));
+  run["payoffs"] = a.payoffs;
+  run["kink-width"] = kink_width(a, problem);
+  const std::vector<CubatureFormula> formulas =
+      a.tolerance ? weak_formulas(a, problem) : std::vector{weak_formula(a, problem).formula};
+  for (const CubatureFormula& formula : formulas)
+    run["formulas' checksums"].push_back(checksum_text(format_formula(formula)));
+  run["options"] = report_of(a, problem, weak_run(a, problem, formulas.front()))["options"];
+  const auto note = [&run](const char* name, const auto& value) {
+    if (value) run["options given"][name] = *value;
+  };
+  note("nodes", a.nodes);
+  note("launches", a.launches);
+  note("rtol", a.relative_tolerance);
+  note("atol", a.absolute_tolerance);
+  return run;
+}
+
 void approximate_and_write(const WeakCommandArguments& a) {
   const auto began = std::chrono::steady_clock::now();
   OutputFile output("--output", a.output.value_or("-"));
   const WeakProblem problem = weak_problem(a.weak);
   WeakOutcome outcome;
+  SavedRun saved(a.saving, identity_of(a.weak, problem));
+  WeakJournal journal;
+  double seconds_before = 0;  // of the run that is taken up
+  const auto seconds = [&] {
+    return seconds_before + std::chrono::duration<double>(std::chrono::steady_clock::now() - began).count();
+  };
+  std::size_t done = 0;
+  const Exchange exchange = [&](StateArchive& archive) {
+    double so_far = seconds();
+    archive(so_far, done);
+    if (archive.reading()) seconds_before = so_far;
+    journal.exchange(archive);
+  };
+  saved.resume(exchange);
   {
     std::optional<Progress> progress;
-    std::size_t done = 0;
     const WeakObserver observer = {[&](std::size_t steps) { progress.emplace("weak", steps, !a.quiet); },
-                                   [&] { progress->advance_to(++done); }};
+                                   [&] {
+                                     progress->advance_to(++done);
+                                     if (saved.interrupted())
+                                       saved.finish(exchange, fmt::format("step {}", done));
+                                     saved.after_step(exchange);
+                                   },
+                                   &journal};
     outcome = a.weak.tolerance ? weak_to_tolerance(a.weak, problem, observer)
                                : weak_with_steps(a.weak, problem, weak_formula(a.weak, problem), 0, observer);
   }
-  const std::chrono::duration<double> took = std::chrono::steady_clock::now() - began;
+  saved.finish(exchange, "the end");
+  const double took = seconds();
   for (NamedNumbers& row : outcome.rows)
     row.insert(row.end(), {{"nodes", static_cast<double>(outcome.leaves)},
                            {"ode_solves", static_cast<double>(outcome.ode_solves)},
-                           {"seconds", took.count()}});
+                           {"seconds", took}});
   const Table table = table_of(problem, outcome.rows);
   output.stage(a.format.value_or(TableFormat::csv) == TableFormat::csv
                    ? to_csv(table)
@@ -98,7 +143,7 @@ void approximate_and_write(const WeakCommandArguments& a) {
   output.publish();
   if (a.quiet) return;
   const std::string work = fmt::format("\n  {} nodes at the end, {} ODE solves, {:.3g} s\n", outcome.leaves,
-                                       outcome.ode_solves, took.count());
+                                       outcome.ode_solves, took);
   std::fputs((summary_of(a.weak, problem, outcome.run, outcome.results) + work).c_str(), stderr);
 }
 
@@ -110,6 +155,7 @@ void add_weak_command(CLI::App& program) {
   add_weak_options(app, a->weak);
   add_text(app, "--output", a->output, "FILE", "Where the table goes [standard output]");
   add_choice(app, "--format", a->format, formats, "Of the table [csv]");
+  add_checkpoint_options(app, a->saving);
   app.add_flag("--quiet", a->quiet, "No summary and no progress bar");
   app.footer(
       "Example:\n"

@@ -17,6 +17,7 @@ WeakOutcome weak_with_steps(const WeakArguments& a, const WeakProblem& problem, 
   run.first_launch = first_launch;
   if (observer.begin) observer.begin(trees * run.steps);
   if (observer.step) run.options.observe = [&](std::size_t) { observer.step(); };
+  run.options.journal = observer.journal;
   const WeakResult result = run_weak(driven.model, averaged_payoffs(a, problem, 1).front(), run);
   outcome.leaves = result.leaves;
   outcome.ode_solves = result.ode_solves;
@@ -49,6 +50,7 @@ WeakOutcome weak_to_tolerance(const WeakArguments& a, const WeakProblem& problem
   if (target.choose_accuracy) run.options.tolerance = {1e-6, 1e-8};
   if (observer.begin) observer.begin(0);
   if (observer.step) run.options.observe = [&](std::size_t) { observer.step(); };
+  run.options.journal = observer.journal;
   // The narrowest of 10 rungs is 0.21 of the width.
   const ControlledResult result =
       wienertree::weak_to_tolerance(problem.source.model(), averaged_payoffs(a, problem, 10), run, target);

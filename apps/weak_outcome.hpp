@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "weak_arguments.hpp"
+#include "wienertree/tree/weak_journal.hpp"
 
 namespace wienertree::app {
 
@@ -20,10 +21,11 @@ struct WeakOutcome {
   std::uint64_t ode_solves = 0;
 };
 
-/// Told how many steps there will be (0: unknown) before the first, and of the end of each. May be empty.
+/// Told how many steps there will be (0: unknown) before the first, and of the end of each; may be empty.
 struct WeakObserver {
   std::function<void(std::size_t)> begin;
   std::function<void()> step;
+  WeakJournal* journal = nullptr;  ///< where trees are recorded; may be null
 };
 
 /// The number of steps is given. Launches start from `first_launch`.

@@ -171,7 +171,7 @@ void KlvFilter::let_likelihoods_decide_if_due() {
 
 void KlvFilter::exchange_state(StateArchive& archive) {
   Generation& g = survivors_;
-  archive(g.time, g.states, g.log_weight, g.log_likelihood, g.parent, g.branch, g.count, time_);
+  archive(g, time_);
   StateArchive::require(g.states.components() == model_.state_dimension() && g.size() > 0 &&
                         g.log_weight.size() == g.size() &&
                         g.log_likelihood.size() == (carries_likelihood() ? g.size() : 0));

@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "wienertree/model/batch.hpp"
+#include "wienertree/model/state_archive.hpp"
 
 namespace wienertree {
 
@@ -19,6 +20,9 @@ struct Generation {
   std::vector<std::uint32_t> count;  ///< N: particles at each node when thinning counts them; empty otherwise
 
   std::size_t size() const { return states.nodes(); }
+  void exchange(StateArchive& archive) {
+    archive(time, states, log_weight, log_likelihood, parent, branch, count);
+  }
 };
 
 }  // namespace wienertree

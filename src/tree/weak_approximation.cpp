@@ -9,6 +9,7 @@
 #include "wienertree/tree/growth.hpp"
 #include "wienertree/tree/slabs.hpp"
 #include "wienertree/tree/tree_size.hpp"
+#include "wienertree/tree/weak_journal.hpp"
 
 namespace wienertree {
 namespace {
@@ -47,10 +48,12 @@ class WeakTree {
     for (const CubaturePath& path : options.formula.paths) log_lambda_.push_back(std::log(path.weight));
   }
 
-  void grow(const Generation& start) {
+  void plant(const Generation& start) { copy_generation(start, nodes_); }
+
+  void grow() {
     const std::size_t steps = options_.grid.size() - 1;
-    copy_generation(start, nodes_);
-    for (std::size_t j = 1; j <= steps; ++j) {
+    while (steps_done_ < steps) {
+      const std::size_t j = steps_done_ + 1;
       const RandomStream random{options_.seed, options_.launch, static_cast<std::uint32_t>(j),
                                 Purpose::path_sampling};
       const bool keeps_all = !pruned_ || nodes_.size() * options_.formula.paths.size() <= options_.nodes;
@@ -58,6 +61,7 @@ class WeakTree {
         step_by_weight(j, random);
       else
         step(j, random, keeps_all || j == steps);
+      steps_done_ = j;
       if (options_.observe) options_.observe(j);
     }
   }
@@ -65,7 +69,7 @@ class WeakTree {
   WeakEstimate average_over_leaves(const std::vector<BatchFunction>& payoffs) const {
     WeakEstimate estimate;
     estimate.leaves = nodes_.size();
-    estimate.ode_solves = grower_.statistics().node_segments;
+    estimate.ode_solves = solves();
     estimate.discarded = discarded_;
     std::vector<double> values;
     for (const BatchFunction& payoff : payoffs) {
@@ -78,7 +82,18 @@ class WeakTree {
     return estimate;
   }
 
+  void exchange(StateArchive& archive) {
+    std::uint64_t solved = solves();
+    archive(steps_done_, nodes_, discarded_, solved);
+    if (!archive.reading()) return;
+    StateArchive::require(steps_done_ < options_.grid.size() && nodes_.size() > 0 &&
+                          nodes_.states.components() == model_.state_dimension() &&
+                          nodes_.log_weight.size() == nodes_.size());
+    solves_before_ = solved;
+  }
+
  private:
+  std::uint64_t solves() const { return solves_before_ + grower_.statistics().node_segments; }
   double length(std::size_t j) const { return options_.grid[j] - options_.grid[j - 1]; }
 
   void discount(Generation& nodes) const {
@@ -156,6 +171,8 @@ class WeakTree {
   Slabs slabs_;
   std::vector<NodeFailure> failures_;
   double discarded_ = 0;
+  std::size_t steps_done_ = 0;
+  std::uint64_t solves_before_ = 0;  ///< of the run whose state was read
 };
 
 }  // namespace
@@ -175,9 +192,17 @@ WeakEstimate weak_approximation(const Model& model, const Generation& start,
                           start.size());
   else
     refuse_oversized_step(options.formula, model, options.nodes, options.memory_limit);
+  if (const WeakEstimate* known = options.journal ? options.journal->next() : nullptr) {
+    StateArchive::require(known->value.size() == payoffs.size());
+    return *known;
+  }
   WeakTree tree(model, options);
-  tree.grow(start);
-  return tree.average_over_leaves(payoffs);
+  tree.plant(start);
+  WeakJournal::Growing growing(options.journal, [&tree](StateArchive& archive) { tree.exchange(archive); });
+  tree.grow();
+  const WeakEstimate estimate = tree.average_over_leaves(payoffs);
+  growing.done(estimate);
+  return estimate;
 }
 
 }  // namespace wienertree

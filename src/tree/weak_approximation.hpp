@@ -18,6 +18,8 @@
 
 namespace wienertree {
 
+class WeakJournal;
+
 struct WeakOptions {
   CubatureFormula formula;   ///< dimension p of the model
   std::vector<double> grid;  ///< from time_grid
@@ -36,8 +38,10 @@ struct WeakOptions {
   /// discounted measure (Feynman-Kac) and no further dimension.
   std::optional<std::size_t> discount_state = {};
   double memory_limit = 4.0e9;  ///< bytes; a tree over it is refused before it starts
-  /// Called after each step with its number, from 1; may be empty.
+  /// Called after each step with its number, from 1; may be empty. What it throws ends the computation.
   std::function<void(std::size_t step)> observe = {};
+  /// Where the trees of the computation are recorded, to be put down and taken up; may be null.
+  WeakJournal* journal = nullptr;
 };
 
 struct WeakEstimate {
@@ -46,6 +50,8 @@ struct WeakEstimate {
   std::uint64_t ode_solves = 0;  ///< node-segments moved
   double discarded = 0;          ///< sum over the steps of Selection::discarded
 };
+
+void exchange(StateArchive& archive, WeakEstimate& estimate);
 
 /// One tree, many payoffs. The law of the start is that of the model; `start` is its first generation.
 ///

@@ -83,6 +83,33 @@ TEST_CASE("what is no whole checkpoint is refused") {
   check_refused(place, filter + "--resume bad", "format 2, and this program reads 1");
 }
 
+TEST_CASE("checkpoints of compare and weak: finished ones give the same bytes, others are refused") {
+  const Workplace place;
+  simulate_benes(place);
+  const std::string compare =
+      "compare benes benes:h1=0.6 --observations Y.csv --nodes 30 --steps 40 --quiet ";
+  const std::string whole = output_of(place, compare);
+  CHECK(output_of(place, compare + "--checkpoint save --checkpoint-every 0.001") == whole);
+  CHECK(output_of(place, compare + "--resume save") == whole);
+  check_refused(place, compare + "--resume save --set mu=0.5", "models 0 parameters mu was 0.05, and is 0.5");
+  check_refused(place, compare + "--resume save --seed 3 --thin tbba", "models 0 options");
+  check_refused(place, filter + "--resume save", "command was \"compare\", and is \"filter\"");
+
+  const std::string weak = "weak heston --horizon 1 --payoff max(s-1,0) --nodes 200 --quiet ";
+  for (const std::string options : {"--steps 6 ", "--steps 6 --richardson ", "--tolerance 1e-3 "}) {
+    const auto values = [&](const std::string& more) {
+      const std::string table = output_of(place, weak + options + more);
+      return table.substr(0, table.rfind(','));  // without the seconds it took
+    };
+    const std::string value = values("");
+    CHECK(values("--checkpoint save --checkpoint-every 0.001") == value);
+    CHECK(values("--resume save") == value);
+    check_refused(place, weak + options + "--resume save --payoff s", "payoffs 1 was none, and is \"s\"");
+    check_refused(place, weak + options + "--resume save --set xi=0.2", "parameters xi");
+    check_refused(place, weak + options + "--resume save --rtol 1e-5", "rtol");
+  }
+}
+
 TEST_CASE("a checkpoint that cannot be written is an error, and the one before stays") {
   Workplace place;
   simulate_benes(place);
