@@ -8,6 +8,7 @@
 #include "wienertree/model/cpp_model.hpp"
 #include "wienertree/tree/slabs.hpp"
 #include "wienertree/tree/weak_control.hpp"
+#include "wienertree/tree/weak_journal.hpp"
 #include "wienertree/tree/weak_levels.hpp"
 
 using namespace wienertree;
@@ -127,6 +128,48 @@ TEST_CASE("in tree order only the chosen children are moved") {
   CHECK(chosen.ode_solves <= 5 * 100 * segments);
   CHECK(chosen.leaves <= 100);
   CHECK(all.ode_solves > 3 * 100 * 11);
+}
+
+TEST_CASE("a computation put down after any step is taken up to the same bytes") {
+  const Model model = bent();
+  for (const auto& [method, order] : {std::pair{ThinningMethod::recombination, SiteOrder::spatial},
+                                      std::pair{ThinningMethod::tbba, SiteOrder::tree},
+                                      std::pair{ThinningMethod::tbba, SiteOrder::spatial}}) {
+    WeakRun run = run_of(method, order, 60);
+    run.launches = method == ThinningMethod::tbba ? 3 : 1;
+    run.richardson = true;
+    const WeakResult whole = run_weak(model, {smooth_payoff(), component(1)}, run);
+    WeakJournal journal;
+    std::vector<std::string> states;
+    run.options.journal = &journal;
+    run.options.observe = [&](std::size_t) {
+      StateArchive archive;
+      journal.exchange(archive);
+      states.push_back(archive.bytes());
+    };
+    CHECK(run_weak(model, {smooth_payoff(), component(1)}, run).value == whole.value);
+    REQUIRE(states.size() == run.launches * (5 + 3));
+    run.options.threads = 2;
+    for (std::size_t put_down = 0; put_down < states.size(); ++put_down) {
+      WeakJournal taken_up;
+      StateArchive archive(states[put_down]);
+      taken_up.exchange(archive);
+      std::size_t steps = put_down + 1;
+      run.options.journal = &taken_up;
+      run.options.observe = [&](std::size_t) { ++steps; };
+      const WeakResult result = run_weak(model, {smooth_payoff(), component(1)}, run);
+      REQUIRE(result.value == whole.value);
+      REQUIRE(result.extrapolated == whole.extrapolated);
+      REQUIRE(result.standard_error == whole.standard_error);
+      REQUIRE(result.ode_solves == whole.ode_solves);
+      REQUIRE(result.leaves == whole.leaves);
+      REQUIRE(result.discarded == whole.discarded);
+      REQUIRE(steps == states.size());  // none was made again
+    }
+    WeakJournal damaged;
+    StateArchive archive(std::string_view(states.back()).substr(0, states.back().size() - 9));
+    CHECK_THROWS_AS(damaged.exchange(archive), InputError);
+  }
 }
 
 TEST_CASE("any number of threads gives the same bytes") {
