@@ -39,18 +39,15 @@ void RungeKuttaBlock::attempt(const Method& method, SegmentField& field, std::sp
   const auto stages = static_cast<std::size_t>(method.pair().stages);
   const double* x = states_.front().value;
   const double* h = step_sizes_.front().value;
-  double* result = results_.front().value;
 
   field.evaluate(states(n), D, {stage(0), dimension_, n, lanes});
   for (std::size_t i = 1; i < stages; ++i) {
     kernel_.combine(shape, x, h, method.row(i), arguments_.front().value);
     field.evaluate(view(arguments_, n), D, {stage(i), dimension_, n, lanes});
   }
-  kernel_.combine(shape, x, h, method.row(stages), result);
-  const ErrorTerms terms{method.row(stages + 1), method.row(stages + 2), stage(0), method.pair().guard_power,
-                         method.pair().guard_weight};
-  kernel_.error(shape, x, result, h, terms, tolerance_.relative, tolerance_.absolute,
-                squared_errors_.front().value);
+  const StepTerms terms{method.row(stages), method.row(stages + 1),    method.row(stages + 2),
+                        stage(0),           method.pair().guard_power, method.pair().guard_weight};
+  kernel_.finish(shape, x, h, terms, tolerance_, results_.front().value, squared_errors_.front().value);
 }
 
 }  // namespace wienertree

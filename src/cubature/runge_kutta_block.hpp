@@ -15,7 +15,7 @@ namespace wienertree {
 /// size alone, bit for bit, provided that the vector fields keep the same promise.
 class RungeKuttaBlock {
  public:
-  static constexpr std::size_t lanes = 64;
+  static constexpr std::size_t lanes = 128;
 
   RungeKuttaBlock(std::size_t dimension, FlowTolerance tolerance);
   RungeKuttaBlock(const RungeKuttaBlock&) = delete;

@@ -1,4 +1,5 @@
-// Compiled with -ffp-contract=off, so that every instruction set returns the same bits.
+// Compiled with -ffp-contract=fast: every sum of products below has one way to be contracted, so that all
+// instruction sets with a fused multiply-add return the same bits.
 #include "wienertree/cubature/runge_kutta_kernel.hpp"
 
 #include <cstring>
@@ -61,29 +62,32 @@ struct Kernel {
     largest = size > largest ? size : largest;
   }
 
-  WIENERTREE_INLINE void error(LaneShape shape, const double* before, const double* after, const double* h,
-                               const ErrorTerms& terms, double relative, double absolute, double* squared) {
+  WIENERTREE_INLINE void finish(LaneShape shape, const double* before, const double* h,
+                                const StepTerms& terms, FlowTolerance tolerance, double* after,
+                                double* squared) {
     for (std::size_t lane = 0; lane < shape.lanes; lane += group) {
       Group e{}, g{}, slope{}, poison{};
       for (std::size_t i = 0; i < shape.components; ++i) {
         const std::size_t at = i * shape.stride + lane;
-        Group e_i, g_i;
+        Group b_i, e_i, g_i;
+        sum(terms.b, at, b_i);
         sum(terms.e, at, e_i);
         sum(terms.g, at, g_i);
         for (std::size_t r = 0; r < registers; ++r) {
-          Vector x, y, k, step;
+          Vector x, k, step;
           load(before + at + r * width, x);
-          load(after + at + r * width, y);
           load(terms.first_stage + at + r * width, k);
           load(h + lane + r * width, step);
+          const Vector y = x + step * b_i.part[r];
+          store(after + at + r * width, y);
           Vector size{};
           grow(size, x);
           grow(size, y);
-          const Vector unit = 1.0 / (size * relative + absolute);
+          const Vector unit = 1.0 / (size * tolerance.relative + tolerance.absolute);
           grow(e.part[r], e_i.part[r] * unit);
           grow(g.part[r], g_i.part[r] * unit);
           grow(slope.part[r], k * unit);
-          grow(slope.part[r], (y - x) / step * unit);
+          grow(slope.part[r], b_i.part[r] * unit);
           // 0, or NaN once anything was not finite: comparisons with NaN above keep the other value.
           poison.part[r] += (e_i.part[r] - e_i.part[r]) + (g_i.part[r] - g_i.part[r]) + (y - y);
         }
@@ -99,20 +103,21 @@ struct Kernel {
   }
 };
 
-#define WIENERTREE_KERNEL(name, Vector, attributes)                                                          \
-  attributes void combine_##name(LaneShape shape, const double* base, const double* h,                       \
-                                 std::span<const StageTerm> terms, double* out) {                            \
-    Kernel<Vector>::combine(shape, base, h, terms, out);                                                     \
-  }                                                                                                          \
-  attributes void error_##name(LaneShape shape, const double* before, const double* after, const double* h,  \
-                               const ErrorTerms& terms, double relative, double absolute, double* squared) { \
-    Kernel<Vector>::error(shape, before, after, h, terms, relative, absolute, squared);                      \
-  }                                                                                                          \
-  constexpr RungeKuttaKernel kernel_##name{combine_##name, error_##name};
+#define WIENERTREE_KERNEL(name, Vector, attributes)                                             \
+  attributes void combine_##name(LaneShape shape, const double* base, const double* h,          \
+                                 std::span<const StageTerm> terms, double* out) {               \
+    Kernel<Vector>::combine(shape, base, h, terms, out);                                        \
+  }                                                                                             \
+  attributes void finish_##name(LaneShape shape, const double* before, const double* h,         \
+                                const StepTerms& terms, FlowTolerance tolerance, double* after, \
+                                double* squared) {                                              \
+    Kernel<Vector>::finish(shape, before, h, terms, tolerance, after, squared);                 \
+  }                                                                                             \
+  constexpr RungeKuttaKernel kernel_##name{combine_##name, finish_##name};
 
 WIENERTREE_KERNEL(portable, Two, )
 #if defined(__x86_64__)
-WIENERTREE_KERNEL(avx2, Four, [[gnu::target("avx2")]])
+WIENERTREE_KERNEL(avx2, Four, [[gnu::target("avx2,fma")]])
 WIENERTREE_KERNEL(avx512, Eight, [[gnu::target("avx512f")]])
 #endif
 
@@ -121,9 +126,9 @@ WIENERTREE_KERNEL(avx512, Eight, [[gnu::target("avx512f")]])
 std::span<const RungeKuttaKernel> runge_kutta_kernels() {
 #if defined(__x86_64__)
   static constexpr RungeKuttaKernel kernels[] = {kernel_portable, kernel_avx2, kernel_avx512};
-  static const std::size_t count = __builtin_cpu_supports("avx512f") ? 3
-                                   : __builtin_cpu_supports("avx2")  ? 2
-                                                                     : 1;
+  static const std::size_t count = __builtin_cpu_supports("avx512f")                                 ? 3
+                                   : __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma") ? 2
+                                                                                                     : 1;
   return {kernels, count};
 #else
   return {&kernel_portable, 1};

@@ -128,13 +128,13 @@ void Tape::evaluate(const TapeKernel& kernel, std::span<const double* const> inp
     kernel.run(program_.data(), program_.size(), slots, scalars, lanes);
   };
 
-  const std::size_t whole = nodes - nodes % tape_block;
+  const std::size_t whole = nodes % kernel.width == 0 ? nodes : nodes - nodes % tape_block;
   if (whole != 0) {
     // A program never writes to an input slot.
     for (std::size_t i = 0; i < inputs_; ++i) slots[i] = const_cast<double*>(inputs[i]);
     for (std::size_t o = 0; o < outputs_; ++o) slots[inputs_ + o] = outputs[o];
     for (std::size_t first = 0; first < whole; first += tape_block) {
-      run(tape_block);
+      run(std::min(tape_block, whole - first));
       for (std::size_t s = 0; s < ends; ++s) slots[s] += tape_block;
     }
   }

@@ -10,7 +10,7 @@
 namespace wienertree {
 
 /// Nodes in a block.
-inline constexpr size_t tape_block = 64;
+inline constexpr size_t tape_block = 128;
 
 /// Instructions of the tape. A suffix names the operands: v a slot with a value per node, s a scalar.
 // clang-format off
