@@ -8,7 +8,7 @@
 namespace wienertree {
 namespace {
 
-constexpr std::size_t most_runs = 8;
+constexpr std::size_t most_runs = 16;
 
 // Starts of the ascending runs, and the end; 0 if there are more than `most_runs`. Descents are counted block
 // by block, and looked for only where there is one.
@@ -105,11 +105,12 @@ void merge_runs(std::vector<std::uint64_t>& items, std::vector<std::uint64_t>& s
   }
 }
 
-constexpr std::size_t digit_bits = 11, buckets = std::size_t{1} << digit_bits, passes = 3;
+constexpr std::size_t digit_bits = 11, buckets = std::size_t{1} << digit_bits;
 
 // Slices of the items are counted and placed side by side: slice k's items of a digit go behind those of the
 // slices before it, so that the order does not depend on the number of slices.
-void radix_sort(std::vector<std::uint64_t>& items, std::vector<std::uint64_t>& scratch, ThreadPool* threads) {
+void radix_sort(std::vector<std::uint64_t>& items, std::vector<std::uint64_t>& scratch, ItemLayout layout,
+                ThreadPool* threads) {
   constexpr std::size_t most_slices = 16, least_slice = std::size_t{1} << 16;
   scratch.resize(items.size());
   const std::size_t wanted = threads == nullptr ? 1
@@ -118,9 +119,9 @@ void radix_sort(std::vector<std::uint64_t>& items, std::vector<std::uint64_t>& s
   const std::size_t slice = (items.size() + wanted - 1) / wanted;
   const std::size_t slices = (items.size() + slice - 1) / slice;
   std::array<std::array<std::uint32_t, buckets>, most_slices> place;
-  for (std::size_t pass = 0; pass < passes; ++pass) {
-    const auto digit = [pass](std::uint64_t item) {
-      return static_cast<std::size_t>(item >> (32 + pass * digit_bits)) & (buckets - 1);
+  for (std::size_t shift = layout.index_bits; shift < 64; shift += digit_bits) {
+    const auto digit = [shift](std::uint64_t item) {
+      return static_cast<std::size_t>(item >> shift) & (buckets - 1);
     };
     for_blocks(threads, items.size(), slice, [&](std::size_t first, std::size_t count, std::size_t k) {
       place[k].fill(0);
@@ -142,7 +143,8 @@ void radix_sort(std::vector<std::uint64_t>& items, std::vector<std::uint64_t>& s
 
 }  // namespace
 
-void sort_items(std::vector<std::uint64_t>& items, std::vector<std::uint64_t>& scratch, ThreadPool* threads) {
+void sort_items(std::vector<std::uint64_t>& items, std::vector<std::uint64_t>& scratch, ItemLayout layout,
+                ThreadPool* threads) {
   std::array<std::size_t, most_runs + 1> start;
   const std::size_t runs = items.empty() ? 1 : find_runs(items, start, threads);
   if (runs == 1) return;
@@ -151,7 +153,7 @@ void sort_items(std::vector<std::uint64_t>& items, std::vector<std::uint64_t>& s
   else if (items.size() < buckets / 2)
     std::sort(items.begin(), items.end());
   else
-    radix_sort(items, scratch, threads);
+    radix_sort(items, scratch, layout, threads);
 }
 
 }  // namespace wienertree

@@ -119,11 +119,12 @@ void Recombination::sort_sites(const Sites& sites) {
     const std::uint64_t mask = bits >> 63 ? ~std::uint64_t{0} : std::uint64_t{1} << 63;
     return static_cast<std::uint32_t>((bits ^ mask) >> 32);
   };
+  constexpr ItemLayout layout;
   items_.resize(live_.size());
-  for (std::size_t j = 0; j < live_.size(); ++j) items_[j] = packed_item(prefix(live_[j]), live_[j]);
-  sort_items(items_, scratch_);
-  settle_equal_prefixes(items_, before);
-  for (std::size_t j = 0; j < live_.size(); ++j) live_[j] = static_cast<std::uint32_t>(items_[j]);
+  for (std::size_t j = 0; j < live_.size(); ++j) items_[j] = layout.item(prefix(live_[j]), live_[j]);
+  sort_items(items_, scratch_, layout);
+  settle_equal_prefixes(items_, layout, before);
+  for (std::size_t j = 0; j < live_.size(); ++j) live_[j] = layout.index(items_[j]);
 }
 
 void Recombination::keep_all(const Sites& sites, Selection& out) const {

@@ -3,12 +3,12 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <limits>
 #include <utility>
 
 #include "wienertree/model/error.hpp"
-#include "wienertree/tree/prefix_sort.hpp"
 
 namespace wienertree {
 namespace {
@@ -49,9 +49,9 @@ void live_sites(std::span<const double> log_weight, WalkFrom walk_from, ThreadPo
   out.resize(kept);
 }
 
-inline std::uint32_t cell(double x, double low, double scale, double cells) {
+inline std::uint64_t cell(double x, double low, double scale, double cells) {
   const double position = (0.25 * x - low) * (scale * cells);
-  return static_cast<std::uint32_t>(static_cast<std::int64_t>(std::min(std::max(position, 0.0), cells - 1)));
+  return static_cast<std::uint64_t>(static_cast<std::int64_t>(std::min(std::max(position, 0.0), cells - 1)));
 }
 
 constexpr auto as_stored = [](std::size_t first) { return [i = first]() mutable { return i++; }; };
@@ -91,12 +91,9 @@ void SiteOrdering::spatial(const Sites& sites, const ParticleMasses& masses,
                                  largest_hilbert_dimension),
                      "spatial order", fmt::format("{}", axes_.size()));
   items_.resize(visit.size());
-  if (axes_.size() == 1)
-    line_items(sites, visit);
-  else
-    curve_items(sites, visit);
+  const ItemLayout layout = axes_.size() == 1 ? line_items(sites, visit) : curve_items(sites, visit);
   for_blocks(sites.threads, visit.size(), block, [&](std::size_t first, std::size_t count, std::size_t) {
-    for (std::size_t i = first; i < first + count; ++i) visit[i] = static_cast<std::uint32_t>(items_[i]);
+    for (std::size_t i = first; i < first + count; ++i) visit[i] = layout.index(items_[i]);
   });
 }
 
@@ -176,24 +173,31 @@ bool SiteOrdering::make_axis(const Sites& sites, std::span<const std::uint32_t> 
   return true;
 }
 
-void SiteOrdering::line_items(const Sites& sites, std::span<const std::uint32_t> live) {
+ItemLayout SiteOrdering::line_items(const Sites& sites, std::span<const std::uint32_t> live) {
   const std::span<const double> x = sites.x.component(axes_[0].component);
   const auto axis = axes_[0];
+  // The index takes the bits it needs, the cell the others: children of a tree crowd near the points of a
+  // lattice, and what shares a cell is sorted by comparison.
+  const ItemLayout layout{static_cast<unsigned>(std::bit_width(x.size()))};
+  const double cells = std::ldexp(1.0, std::min(64 - static_cast<int>(layout.index_bits), 52));
   for_blocks(sites.threads, live.size(), block, [&](std::size_t first, std::size_t count, std::size_t) {
     for (std::size_t i = first; i < first + count; ++i)
-      items_[i] = packed_item(cell(x[live[i]], axis.low, axis.scale, 0x1.0p32), live[i]);
+      items_[i] = layout.item(cell(x[live[i]], axis.low, axis.scale, cells), live[i]);
   });
-  sort_items(items_, scratch_, sites.threads);
+  sort_items(items_, scratch_, layout, sites.threads);
   settle_equal_prefixes(
-      items_, [x](std::uint32_t a, std::uint32_t b) { return x[a] < x[b] || (x[a] == x[b] && a < b); },
+      items_, layout,
+      [x](std::uint32_t a, std::uint32_t b) { return x[a] < x[b] || (x[a] == x[b] && a < b); },
       sites.threads);
+  return layout;
 }
 
-void SiteOrdering::curve_items(const Sites& sites, std::span<const std::uint32_t> live) {
+ItemLayout SiteOrdering::curve_items(const Sites& sites, std::span<const std::uint32_t> live) {
   const std::size_t d = axes_.size();
   const unsigned bits = std::min(16U, static_cast<unsigned>(64 / d));
   const double cells = std::ldexp(1.0, static_cast<int>(bits));
   const unsigned unused = 64 - static_cast<unsigned>(d) * bits;
+  constexpr ItemLayout layout;
   keys_.resize(sites.log_weight.size());
   for_blocks(sites.threads, live.size(), block, [&](std::size_t begin, std::size_t count, std::size_t) {
     HilbertAxes cells_of_axis;
@@ -203,23 +207,25 @@ void SiteOrdering::curve_items(const Sites& sites, std::span<const std::uint32_t
       for (std::size_t i = 0; i < d; ++i) {
         const std::span<const double> x = sites.x.component(axes_[i].component);
         for (std::size_t l = 0; l < n; ++l)
-          cells_of_axis[i][l] = cell(x[live[first + l]], axes_[i].low, axes_[i].scale, cells);
+          cells_of_axis[i][l] =
+              static_cast<std::uint32_t>(cell(x[live[first + l]], axes_[i].low, axes_[i].scale, cells));
       }
       hilbert_keys(cells_of_axis, d, bits, key);
       for (std::size_t l = 0; l < n; ++l) {
         const std::uint64_t leading = key[l] << unused;
         keys_[live[first + l]] = leading;
-        items_[first + l] = packed_item(static_cast<std::uint32_t>(leading >> 32), live[first + l]);
+        items_[first + l] = layout.item(layout.prefix(leading), live[first + l]);
       }
     }
   });
-  sort_items(items_, scratch_, sites.threads);
+  sort_items(items_, scratch_, layout, sites.threads);
   settle_equal_prefixes(
-      items_,
+      items_, layout,
       [this](std::uint32_t a, std::uint32_t b) {
         return keys_[a] < keys_[b] || (keys_[a] == keys_[b] && a < b);
       },
       sites.threads);
+  return layout;
 }
 
 }  // namespace wienertree

@@ -10,6 +10,7 @@
 
 #include "wienertree/tree/hilbert.hpp"
 #include "wienertree/tree/masses.hpp"
+#include "wienertree/tree/prefix_sort.hpp"
 #include "wienertree/tree/thinning.hpp"
 
 namespace wienertree {
@@ -45,8 +46,8 @@ class SiteOrdering {
   };
   bool make_axis(const Sites& sites, std::span<const std::uint32_t> live, std::size_t component, Axis& axis);
   void draw_sample(const ParticleMasses& masses, ThreadPool* threads);
-  void line_items(const Sites& sites, std::span<const std::uint32_t> live);
-  void curve_items(const Sites& sites, std::span<const std::uint32_t> live);
+  ItemLayout line_items(const Sites& sites, std::span<const std::uint32_t> live);
+  ItemLayout curve_items(const Sites& sites, std::span<const std::uint32_t> live);
 
   std::vector<Axis> axes_;
   std::vector<Range> range_;          ///< each block of sites
