@@ -48,17 +48,6 @@ void forget(const std::string& name) {
     }
 }
 
-// 0, or errno of the write that failed. A short write is continued.
-int write_all(int file, std::string_view content) {
-  while (!content.empty()) {
-    const ssize_t written = ::write(file, content.data(), content.size());
-    if (written < 0 && errno == EINTR) continue;
-    if (written < 0) return errno;
-    content.remove_prefix(static_cast<std::size_t>(written));
-  }
-  return 0;
-}
-
 // ".out.csv.host.": what temporary names beside out.csv begin with, on this machine.
 std::string temporary_prefix(const fs::path& target) {
   std::array<char, 256> host{};
@@ -91,6 +80,16 @@ void sync_directory(const fs::path& directory) {
 }
 
 }  // namespace
+
+int write_all(int file, std::string_view content) {
+  while (!content.empty()) {
+    const ssize_t written = ::write(file, content.data(), content.size());
+    if (written < 0 && errno == EINTR) continue;
+    if (written < 0) return errno;
+    content.remove_prefix(static_cast<std::size_t>(written));
+  }
+  return 0;
+}
 
 OutputFile::OutputFile(std::string option, const std::string& target)
     : option_(std::move(option)), target_(target) {

@@ -40,6 +40,10 @@ class OutputFile {
   unsigned mode_ = 0;
 };
 
+/// Writes all of it, going on after a short write, as on a disk that is nearly full.
+/// Returns 0, or errno of the write that failed.
+int write_all(int file, std::string_view content);
+
 /// Writes to standard output and waits until it is taken.
 /// @throws BrokenPipe, or RunError for any other failure
 void write_to_stdout(std::string_view content);

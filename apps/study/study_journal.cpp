@@ -114,7 +114,7 @@ StudyJournal::StudyJournal(const std::string& directory, std::vector<std::string
   std::string text = std::move(all).str();
   const std::size_t whole = text.rfind('\n') == std::string::npos ? 0 : text.rfind('\n') + 1;
   if (whole < text.size() && ::ftruncate(descriptor_, static_cast<off_t>(whole)) != 0)
-    throw RunError("cannot be shortened: " + reason(), "study", file_);
+    throw RunError("cannot be shortened: " + reason(), "--output", file_);
   text.resize(whole);
   std::istringstream lines(text);
   std::string line;
@@ -125,10 +125,7 @@ StudyJournal::StudyJournal(const std::string& directory, std::vector<std::string
       throw InputError("holds the runs of a study of other quantities: give another directory", "--output",
                        file_);
   }
-  if (!text.empty()) return;
-  const std::string first = header();
-  if (::write(descriptor_, first.data(), first.size()) != static_cast<ssize_t>(first.size()))
-    throw RunError("cannot be written: " + reason(), "study", file_);
+  if (text.empty()) write_line(header());
 }
 
 StudyJournal::~StudyJournal() {
@@ -136,11 +133,18 @@ StudyJournal::~StudyJournal() {
   if (lock_ >= 0) ::close(lock_);
 }
 
-void StudyJournal::append(const RunRecord& record) {
-  const std::string line = line_of(record);
-  // One write: a run that is killed leaves whole lines, and at most one part of a line at the end.
-  if (::write(descriptor_, line.data(), line.size()) != static_cast<ssize_t>(line.size()))
-    throw RunError("cannot be written: " + reason(), "study", file_);
+void StudyJournal::append(const RunRecord& record) { write_line(line_of(record)); }
+
+// A run that is killed leaves whole lines, and at most a part of one at the end; a disk that is full, whole
+// lines.
+void StudyJournal::write_line(const std::string& line) {
+  const off_t before = ::lseek(descriptor_, 0, SEEK_END);
+  const int error = write_all(descriptor_, line);
+  if (error == 0) return;
+  if (before >= 0 && ::ftruncate(descriptor_, before) != 0) {
+    // The next run cuts off what is left of the line.
+  }
+  throw RunError("cannot be written: " + std::generic_category().message(error), "--output", file_);
 }
 
 void StudyJournal::rewrite(const std::vector<RunRecord>& records) {

@@ -28,12 +28,14 @@ class StudyJournal {
   StudyJournal& operator=(const StudyJournal&) = delete;
 
   const std::vector<RunRecord>& records() const { return records_; }
-  /// Writes one line in one piece. Not for several threads at once. @throws RunError if it cannot be written
+  /// Writes one line. Not for several threads at once. @throws RunError if it cannot be written; what was
+  /// written of it is taken back
   void append(const RunRecord& record);
   /// Puts the file in this order, as a whole. @throws RunError
   void rewrite(const std::vector<RunRecord>& records);
 
  private:
+  void write_line(const std::string& line);
   std::string line_of(const RunRecord& record) const;
   std::string header() const;
   RunRecord parse(const std::string& line, std::size_t number) const;
