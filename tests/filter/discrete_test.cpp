@@ -125,6 +125,32 @@ TEST_CASE(
   }
 }
 
+TEST_CASE("particles that are shown nothing keep the law of the signal") {
+  const Model model = plane("current");
+  ObservationPath path;
+  path.dimension = 2;
+  for (const double t : {0.0, 4.0}) path.append(t, std::vector<double>{NAN, NAN});
+  constexpr std::size_t N = 100'000;
+  for (const FilterMethod method : {FilterMethod::euler, FilterMethod::weighted}) {
+    const auto filter = filtered(
+        model, path,
+        with_method(method, method == FilterMethod::euler ? ThinningMethod::systematic : ThinningMethod::none,
+                    N),
+        30);
+    const Posterior& p = filter->posterior();
+    // covariance of the start + 4 sigma sigma^T
+    const double xx = 0.5 + 4 * 0.40, zz = 0.3 + 4 * 0.34, xz = 0.1 + 4 * (-0.18 + 0.10);
+    const double sd = std::sqrt(1.0 / N);
+    CHECK(p.log_evidence == Approx(0).margin(1e-9));
+    // Null hypothesis: that law, whose estimates have these standard deviations; 6 of them: 2e-9.
+    CHECK(std::abs(mean(p, 0) - 0.5) < 6 * sd * std::sqrt(xx));
+    CHECK(std::abs(mean(p, 1) + 1.0) < 6 * sd * std::sqrt(zz));
+    CHECK(std::abs(covariance(p, 0, 0) - xx) < 6 * sd * std::sqrt(2.0) * xx);
+    CHECK(std::abs(covariance(p, 1, 1) - zz) < 6 * sd * std::sqrt(2.0) * zz);
+    CHECK(std::abs(covariance(p, 0, 1) - xz) < 6 * sd * std::sqrt(xx * zz + xz * xz));
+  }
+}
+
 TEST_CASE(
     "random starts, irregular times, missing values and both timings: recombination agrees with Kalman") {
   for (const char* timing : {"current", "previous"}) {

@@ -150,6 +150,76 @@ TEST_CASE("a tree whose children fit in N is not thinned") {
   CHECK(mean(a->posterior(), 0) == mean(b->posterior(), 0));
 }
 
+TEST_CASE("random thinning leaves the full tree's evidence as its expectation, whenever likelihoods decide") {
+  const Model model = benes_cases[3].model();
+  const auto path = simulate(model, 4, 400, 400, 5).observations;
+  const ObservationWindows windows(path, model.observation, model.timing, 8);
+  FilterOptions full = tbba(construct_lyons_victoir_5_1(), 1);
+  full.method = FilterMethod::full_tree;
+  const auto tree = make_filter(model, full);
+  run(*tree, windows, {});
+  const auto check = [&](ThinningMethod thinning, PruneWeights prune, double threshold) {
+    double sum = 0, squares = 0;
+    constexpr std::uint32_t launches = 400;
+    for (std::uint32_t l = 0; l < launches; ++l) {
+      FilterOptions o = tbba(construct_lyons_victoir_5_1(), 30);
+      o.thinning.method = thinning;
+      o.prune_weights = prune;
+      o.ess_threshold = threshold;
+      o.launch = l;
+      const auto filter = make_filter(model, o);
+      run(*filter, windows, {});
+      const double ratio = std::exp(filter->posterior().log_evidence - tree->posterior().log_evidence);
+      sum += ratio / launches;
+      squares += ratio * ratio / launches;
+    }
+    const double se = std::sqrt((squares - sum * sum) / (launches - 1));
+    INFO("threshold " << threshold << ": ratio of evidences " << sum << " +- " << se);
+    // Null hypothesis: expectation 1. |t| > 6.5 on 399 degrees of freedom: 2e-10.
+    CHECK(std::abs(sum - 1) < 6.5 * se);
+    CHECK(se < 0.02);
+  };
+  for (const ThinningMethod thinning : {ThinningMethod::tbba, ThinningMethod::systematic}) {
+    for (const double threshold : {1.0, 0.9, 0.5}) check(thinning, PruneWeights::likelihood, threshold);
+    check(thinning, PruneWeights::cubature, 1.0);
+  }
+}
+
+TEST_CASE("a node that fails and is dropped takes its mass with it") {
+  // One step of length 1 from 0.4 ends at 0.4 and 0.4 +- 0.3 sqrt(3): the lowest is outside.
+  const Model model = parse_model(R"TOML(
+name = "bounded"
+convention = "ito"
+[state]
+x = { initial = 0.4, lower = 0.0 }
+[drift]
+x = 0
+[diffusion]
+x = [0.3]
+[observation]
+kind = "discrete"
+h = ["x"]
+noise = { law = "gaussian", sd = 0.5 }
+)TOML",
+                                  "bounded.toml", {});
+  ObservationPath path;
+  path.dimension = 1;
+  path.append(0, std::vector<double>{NAN});
+  path.append(1, std::vector{0.7});
+  FilterOptions o = tbba(construct_lyons_victoir_5_1(), 10);
+  o.on_node_failure = OnNodeFailure::drop;
+  const auto filter = make_filter(model, o);
+  run(*filter, ObservationWindows(path, model.observation, model.timing, 0), {});
+  const auto density = [](double x) {
+    return std::exp(-std::pow((0.7 - x) / 0.5, 2) / 2) / (0.5 * std::sqrt(2 * std::numbers::pi));
+  };
+  const double middle = 2.0 / 3 * density(0.4), upper = 1.0 / 6 * density(0.4 + 0.3 * std::sqrt(3.0));
+  const Posterior& p = filter->posterior();
+  CHECK(filter->statistics().dropped_nodes == 1);
+  CHECK(p.log_evidence == Approx(std::log(middle + upper)).epsilon(1e-12));
+  CHECK(mean(p, 0) == Approx(0.4 + 0.3 * std::sqrt(3.0) * upper / (middle + upper)).epsilon(1e-12));
+}
+
 TEST_CASE("log-evidence agrees with the closed form on all four Benes problems") {
   for (const BenesCase& c : benes_cases) {
     const Model model = c.model();
