@@ -3,12 +3,14 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <limits>
 #include <utility>
 
 #include "wienertree/filter/places.hpp"
 #include "wienertree/tree/initial.hpp"
+#include "wienertree/tree/log_weights.hpp"
 #include "wienertree/tree/tree_size.hpp"
 
 namespace wienertree {
@@ -48,7 +50,7 @@ void KlvFilter::advance(const ObservationWindow& window) {
     grow(window);
     weigh(window);
   }
-  check_log_weights(likelihood_of(window.length() > 0 ? children_ : survivors_), window);
+  check_weights(likelihood_of(window.length() > 0 ? children_ : survivors_), window);
   if (window.length() > 0) thin(window);
   ++statistics_.steps;
   time_ = window.end;
@@ -130,6 +132,18 @@ void KlvFilter::weigh(const ObservationWindow& window) {
     const BatchView G = functional_->uses_derivative() ? derivative_.view().nodes(first, count) : BatchView{};
     functional_->at_end(window, sensor_.view().nodes(first, count), G, h1, w);
   });
+}
+
+// As check_log_weights, which is asked only where something is wrong.
+void KlvFilter::check_weights(std::span<const double> log_weight, const ObservationWindow& window) {
+  std::atomic<bool> valid = true, positive = false;
+  for_blocks(&grower_.threads(), log_weight.size(), 16 * block,
+             [&](std::size_t first, std::size_t count, std::size_t) {
+               const auto [largest, all_valid] = largest_log_weight(log_weight.subspan(first, count));
+               if (!all_valid) valid = false;
+               if (largest > -std::numeric_limits<double>::infinity()) positive = true;
+             });
+  if (!valid || !positive) check_log_weights(log_weight, window);
 }
 
 void KlvFilter::thin(const ObservationWindow& window) {

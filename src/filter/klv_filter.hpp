@@ -23,6 +23,7 @@ class KlvFilter final : public Filter {
   void observe_start(const ObservationWindow& window);
   void grow(const ObservationWindow& window);
   void weigh(const ObservationWindow& window);
+  void check_weights(std::span<const double> log_weight, const ObservationWindow& window);
   void thin(const ObservationWindow& window);
   void let_likelihoods_decide_if_due();
   void handle_failures(const ObservationWindow& window);

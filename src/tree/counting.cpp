@@ -62,8 +62,8 @@ void CountingThinning::thin(const Sites& sites, std::size_t budget, const Random
     return;
   }
   put_in_order(order_, ordering_, sites, masses_, visit_);
-  std::vector<std::uint64_t>& visited_mass = ordering_.workspace();
-  visited_mass.resize(visit_.size());
+  Buffer<std::uint64_t>& visited_mass = ordering_.workspace();
+  resize_unspecified(visited_mass, visit_.size());
   for_blocks(sites.threads, visit_.size(), block, [&](std::size_t first, std::size_t count, std::size_t) {
     for (std::size_t i = first; i < first + count; ++i) visited_mass[i] = masses_.mass[visit_[i]];
   });
@@ -73,7 +73,7 @@ void CountingThinning::thin(const Sites& sites, std::size_t budget, const Random
 
 void CountingThinning::count_particles(std::span<const std::uint64_t> mass, const RandomStream& random,
                                        ThreadPool* threads) {
-  count_.resize(mass.size());
+  resize_unspecified(count_, mass.size());
   const int bits = masses_.fraction_bits;
   switch (method_) {
     case ThinningMethod::multinomial:
@@ -104,9 +104,9 @@ void CountingThinning::collect(SiteAt site_at, ThreadPool* threads, Selection& o
   });
   std::size_t kept = 0;
   for (std::size_t& k : kept_before_) kept += std::exchange(k, kept);
-  out.site.resize(kept);
-  out.count.resize(kept);
-  out.log_weight.resize(kept);
+  resize_unspecified(out.site, kept);
+  resize_unspecified(out.count, kept);
+  resize_unspecified(out.log_weight, kept);
   const double log_particle = masses_.log_total - std::log(static_cast<double>(masses_.particles));
   for_blocks(threads, n, block, [&](std::size_t first, std::size_t count, std::size_t b) {
     std::size_t k = kept_before_[b];

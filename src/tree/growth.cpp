@@ -9,6 +9,7 @@
 #include <mutex>
 
 #include "wienertree/model/error.hpp"
+#include "wienertree/tree/buffer.hpp"
 
 namespace wienertree {
 namespace {
@@ -30,10 +31,10 @@ void shape_children(const Generation& parents, const CubatureFormula& formula, d
   const std::size_t total = nodes * branches;
   children.time = parents.time + s;
   children.states.reshape(parents.states.components(), total);
-  children.log_weight.resize(total);
-  children.log_likelihood.resize(parents.log_likelihood.empty() ? 0 : total);
-  children.parent.resize(total);
-  children.branch.resize(total);
+  resize_unspecified(children.log_weight, total);
+  resize_unspecified(children.log_likelihood, parents.log_likelihood.empty() ? 0 : total);
+  resize_unspecified(children.parent, total);
+  resize_unspecified(children.branch, total);
   children.count.clear();
 }
 
@@ -62,7 +63,7 @@ void gather(std::span<const T> from, std::span<const std::uint32_t> site, std::s
 
 template <class T>
 void copy_column(std::span<const T> from, std::vector<T>& to, ThreadPool* threads) {
-  to.resize(from.size());
+  resize_unspecified(to, from.size());
   for_blocks(threads, from.size(), nodes_a_task, [&](std::size_t first, std::size_t count, std::size_t) {
     std::copy_n(from.begin() + static_cast<std::ptrdiff_t>(first), count,
                 to.begin() + static_cast<std::ptrdiff_t>(first));
@@ -72,7 +73,7 @@ void copy_column(std::span<const T> from, std::vector<T>& to, ThreadPool* thread
 template <class T>
 void gather(const std::vector<T>& from, std::span<const std::uint32_t> site, std::vector<T>& to,
             ThreadPool* threads) {
-  to.resize(from.empty() ? 0 : site.size());
+  resize_unspecified(to, from.empty() ? 0 : site.size());
   if (!from.empty()) gather(std::span<const T>(from), site, std::span<T>(to), threads);
 }
 
@@ -122,11 +123,11 @@ std::vector<Run> plant_chosen(const Generation& parents, std::size_t branches, d
       runs.push_back({j, first, std::min(nodes_a_task, end[j + 1] - first)});
   children.time = parents.time + s;
   children.states.reshape(parents.states.components(), total);
-  children.log_weight.resize(total);
-  children.log_likelihood.resize(parents.log_likelihood.empty() ? 0 : total);
-  children.parent.resize(total);
-  children.branch.resize(total);
-  children.count.resize(chosen.count.size());
+  resize_unspecified(children.log_weight, total);
+  resize_unspecified(children.log_likelihood, parents.log_likelihood.empty() ? 0 : total);
+  resize_unspecified(children.parent, total);
+  resize_unspecified(children.branch, total);
+  resize_unspecified(children.count, chosen.count.size());
   std::vector<std::size_t>& place = end;  // of the next child of each branch
   for (std::size_t k = 0; k < total; ++k) {
     const std::size_t branch = chosen.site[k] / nodes, parent = chosen.site[k] % nodes, at = place[branch]++;

@@ -17,7 +17,8 @@
 namespace wienertree {
 namespace {
 
-constexpr std::size_t chunk = 128;  ///< sites summed plainly before the compensated sum takes over
+/// Sites summed plainly before the compensated sum takes over.
+constexpr std::size_t chunk = ParticleMasses::chunk;
 constexpr std::size_t block = 128 * chunk;
 
 // Neumaier (1974, Z. angew. Math. Mech. 54, 39-51).
@@ -67,7 +68,7 @@ void assign_masses(std::span<const double> log_weight, std::uint64_t particles, 
   const double largest = n > 0 ? *heaviest_block : -infinity;
   if (!std::isfinite(largest)) refuse(log_weight);
 
-  out.mass.resize(n);
+  resize_unspecified(out.mass, n);
   scratch.resize((n + chunk - 1) / chunk);
   for_blocks(threads, n, block, [&](std::size_t first, std::size_t count, std::size_t) {
     std::array<double, chunk> w;
@@ -87,17 +88,25 @@ void assign_masses(std::span<const double> log_weight, std::uint64_t particles, 
   // w_i <= 1 <= total, so a product is at most N 2^B < 2^63 up to rounding.
   const double scale = std::ldexp(static_cast<double>(particles), out.fraction_bits) / total;
   std::atomic<std::uint64_t> assigned = 0;
+  out.chunk_mass.resize(scratch.size());
   for_blocks(threads, n, block, [&](std::size_t first, std::size_t count, std::size_t) {
     std::uint64_t here = 0;
-    for (std::uint64_t& m : std::span(out.mass).subspan(first, count)) {
-      m = static_cast<std::uint64_t>(static_cast<std::int64_t>(std::bit_cast<double>(m) * scale + 0.5));
-      here += m;
+    for (std::size_t i = first; i < first + count; i += chunk) {
+      std::uint64_t sum_here = 0;
+      for (std::uint64_t& m : std::span(out.mass).subspan(i, std::min(chunk, first + count - i))) {
+        m = static_cast<std::uint64_t>(static_cast<std::int64_t>(std::bit_cast<double>(m) * scale + 0.5));
+        sum_here += m;
+      }
+      out.chunk_mass[i / chunk] = sum_here;
+      here += sum_here;
     }
     assigned += here;
   });
   const auto heaviest =
       static_cast<std::size_t>(std::find(heaviest_from, log_weight.end(), largest) - log_weight.begin());
-  out.mass[heaviest] += (particles << out.fraction_bits) - assigned;  // modulo 2^64: may subtract
+  const std::uint64_t missing = (particles << out.fraction_bits) - assigned;  // modulo 2^64: may subtract
+  out.mass[heaviest] += missing;
+  out.chunk_mass[heaviest / chunk] += missing;
 }
 
 void split_mass(std::uint64_t mass, std::span<const double> lambda, std::span<std::uint64_t> children) {

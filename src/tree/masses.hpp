@@ -8,15 +8,18 @@
 #include <span>
 #include <vector>
 
+#include "wienertree/tree/buffer.hpp"
 #include "wienertree/tree/parallel.hpp"
 
 namespace wienertree {
 
 struct ParticleMasses {
-  std::vector<std::uint64_t> mass;  ///< M values, sum = particles << fraction_bits
-  std::uint64_t particles = 0;      ///< N
-  int fraction_bits = 0;            ///< B = 63 - bits of N, so that 2^62 <= N 2^B < 2^63
-  double log_total = 0;             ///< log sum_i exp(log_weight_i)
+  static constexpr std::size_t chunk = 128;
+  Buffer<std::uint64_t> mass;             ///< M values, sum = particles << fraction_bits
+  std::vector<std::uint64_t> chunk_mass;  ///< sums over `chunk` sites each, the last over what remains
+  std::uint64_t particles = 0;            ///< N
+  int fraction_bits = 0;                  ///< B = 63 - bits of N, so that 2^62 <= N 2^B < 2^63
+  double log_total = 0;                   ///< log sum_i exp(log_weight_i)
   std::vector<double> scratch;
 };
 

@@ -83,10 +83,10 @@ MergePart part_of_merge(std::span<const std::uint64_t> items, std::size_t begin,
   return {cut_a(part), cut_a(part + 1), cut_b(part), cut_b(part + 1)};
 }
 
-void merge_runs(std::vector<std::uint64_t>& items, std::vector<std::uint64_t>& scratch, std::size_t runs,
+void merge_runs(Buffer<std::uint64_t>& items, Buffer<std::uint64_t>& scratch, std::size_t runs,
                 std::array<std::size_t, most_runs + 1>& start, ThreadPool* threads) {
   constexpr std::size_t least_part = 4096;
-  scratch.resize(items.size());
+  resize_unspecified(scratch, items.size());
   while (runs > 1) {
     const std::size_t pairs = (runs + 1) / 2;
     const std::size_t parts =
@@ -109,10 +109,10 @@ constexpr std::size_t digit_bits = 11, buckets = std::size_t{1} << digit_bits;
 
 // Slices of the items are counted and placed side by side: slice k's items of a digit go behind those of the
 // slices before it, so that the order does not depend on the number of slices.
-void radix_sort(std::vector<std::uint64_t>& items, std::vector<std::uint64_t>& scratch, ItemLayout layout,
+void radix_sort(Buffer<std::uint64_t>& items, Buffer<std::uint64_t>& scratch, ItemLayout layout,
                 ThreadPool* threads) {
   constexpr std::size_t most_slices = 16, least_slice = std::size_t{1} << 16;
-  scratch.resize(items.size());
+  resize_unspecified(scratch, items.size());
   const std::size_t wanted = threads == nullptr ? 1
                                                 : std::clamp(items.size() / least_slice, std::size_t{1},
                                                              std::min(most_slices, threads->size()));
@@ -143,7 +143,7 @@ void radix_sort(std::vector<std::uint64_t>& items, std::vector<std::uint64_t>& s
 
 }  // namespace
 
-void sort_items(std::vector<std::uint64_t>& items, std::vector<std::uint64_t>& scratch, ItemLayout layout,
+void sort_items(Buffer<std::uint64_t>& items, Buffer<std::uint64_t>& scratch, ItemLayout layout,
                 ThreadPool* threads) {
   std::array<std::size_t, most_runs + 1> start;
   const std::size_t runs = items.empty() ? 1 : find_runs(items, start, threads);

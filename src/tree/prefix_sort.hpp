@@ -5,8 +5,8 @@
 #include <cstddef>
 #include <cstdint>
 #include <span>
-#include <vector>
 
+#include "wienertree/tree/buffer.hpp"
 #include "wienertree/tree/parallel.hpp"
 
 namespace wienertree {
@@ -26,7 +26,7 @@ struct ItemLayout {
 /// arrive so); anything else goes through a radix sort of the prefixes, 11 bits a pass, which needs the items
 /// to stand by ascending index. `scratch` is resized to the number of items and swapped at will.
 /// @param threads to work on, if any
-void sort_items(std::vector<std::uint64_t>& items, std::vector<std::uint64_t>& scratch, ItemLayout layout,
+void sort_items(Buffer<std::uint64_t>& items, Buffer<std::uint64_t>& scratch, ItemLayout layout,
                 ThreadPool* threads = nullptr);
 
 /// Puts items first..last-1 of equal prefix into the order `before(index_a, index_b)`, a strict total order,

@@ -37,7 +37,7 @@ class Recombination final : public Thinning {
   std::vector<std::size_t> varying_;  ///< components
   std::vector<double> log_weight_;    ///< of the live sites
   Batch x_;                           ///< varying components of the live sites
-  std::vector<std::uint64_t> items_, scratch_;
+  Buffer<std::uint64_t> items_, scratch_;
   recombination::LineRecombination line_;
   recombination::LineNodes nodes_;
   recombination::SpaceRecombination space_;

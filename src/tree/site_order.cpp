@@ -36,7 +36,7 @@ template <class WalkFrom>
 void live_sites(std::span<const double> log_weight, WalkFrom walk_from, ThreadPool* threads,
                 std::vector<std::uint32_t>& out, std::vector<std::size_t>& live) {
   const std::size_t n = log_weight.size();
-  out.resize(n);
+  resize_unspecified(out, n);
   live.resize((n + block - 1) / block);
   for_blocks(threads, n, block, [&](std::size_t first, std::size_t count, std::size_t b) {
     live[b] = write_live(log_weight, count, walk_from(first), out.data() + first);
@@ -80,7 +80,7 @@ void SiteOrdering::tree(const Sites& sites, std::vector<std::uint32_t>& visit) {
 void SiteOrdering::spatial(const Sites& sites, const ParticleMasses& masses,
                            std::vector<std::uint32_t>& visit) {
   live_sites(sites.log_weight, as_stored, sites.threads, visit, live_);
-  draw_sample(masses, sites.threads);
+  draw_sample(masses);
   axes_.clear();
   Axis axis;
   for (std::size_t c = 0; c < sites.x.components(); ++c)
@@ -90,35 +90,31 @@ void SiteOrdering::spatial(const Sites& sites, const ParticleMasses& masses,
     throw InputError(fmt::format("spatial order takes at most {} varying components; use tree order",
                                  largest_hilbert_dimension),
                      "spatial order", fmt::format("{}", axes_.size()));
-  items_.resize(visit.size());
+  resize_unspecified(items_, visit.size());
   const ItemLayout layout = axes_.size() == 1 ? line_items(sites, visit) : curve_items(sites, visit);
   for_blocks(sites.threads, visit.size(), block, [&](std::size_t first, std::size_t count, std::size_t) {
     for (std::size_t i = first; i < first + count; ++i) visit[i] = layout.index(items_[i]);
   });
 }
 
-// Sites at equal steps of mass: a sample of the weighted measure.
-void SiteOrdering::draw_sample(const ParticleMasses& masses, ThreadPool* threads) {
-  const std::size_t n = masses.mass.size(), size = std::clamp(n / 4, least_sample, largest_sample);
+// Sites at equal steps of mass: a sample of the weighted measure. The k-th lies where the mass below reaches
+// step/2 + k step.
+void SiteOrdering::draw_sample(const ParticleMasses& masses) {
+  const std::size_t size = std::clamp(masses.mass.size() / 4, least_sample, largest_sample);
   const std::uint64_t step = (masses.particles << masses.fraction_bits) / size;
-  below_.resize((n + block - 1) / block);
-  for_blocks(threads, n, block, [&](std::size_t first, std::size_t count, std::size_t b) {
-    below_[b] = 0;
-    for (const std::uint64_t m : std::span(masses.mass).subspan(first, count)) below_[b] += m;
-  });
-  // The k-th lies where the mass below reaches step/2 + k step.
-  std::uint64_t total = 0;
-  for (std::uint64_t& m : below_) total += std::exchange(m, total);
-  const auto samples_below = [=](std::uint64_t mass) { return (mass + step - 1 - step / 2) / step; };
-  sample_.resize(samples_below(total));
-  for_blocks(threads, n, block, [&](std::size_t first, std::size_t, std::size_t b) {
-    std::uint64_t k = samples_below(below_[b]), behind = below_[b];
-    const std::uint64_t last = samples_below(b + 1 < below_.size() ? below_[b + 1] : total);
-    for (std::size_t i = first; k < last; ++i) {
-      behind += masses.mass[i];
-      for (; k < last && step / 2 + k * step < behind; ++k) sample_[k] = static_cast<std::uint32_t>(i);
+  sample_.clear();
+  std::uint64_t behind = 0, next = step / 2;
+  for (std::size_t c = 0; c < masses.chunk_mass.size(); ++c) {
+    if (next >= behind + masses.chunk_mass[c]) {
+      behind += masses.chunk_mass[c];
+      continue;
     }
-  });
+    const std::size_t first = c * ParticleMasses::chunk;
+    const std::size_t last = std::min(first + ParticleMasses::chunk, masses.mass.size());
+    for (std::size_t i = first; i < last; ++i)
+      for (behind += masses.mass[i]; next < behind; next += step)
+        sample_.push_back(static_cast<std::uint32_t>(i));
+  }
 }
 
 // False if the component is constant over the sites.
@@ -198,7 +194,7 @@ ItemLayout SiteOrdering::curve_items(const Sites& sites, std::span<const std::ui
   const double cells = std::ldexp(1.0, static_cast<int>(bits));
   const unsigned unused = 64 - static_cast<unsigned>(d) * bits;
   constexpr ItemLayout layout;
-  keys_.resize(sites.log_weight.size());
+  resize_unspecified(keys_, sites.log_weight.size());
   for_blocks(sites.threads, live.size(), block, [&](std::size_t begin, std::size_t count, std::size_t) {
     HilbertAxes cells_of_axis;
     std::array<std::uint64_t, hilbert_block> key;

@@ -33,7 +33,7 @@ class SiteOrdering {
   void spatial(const Sites& sites, const ParticleMasses& masses, std::vector<std::uint32_t>& visit);
 
   /// Memory of the last sort, which is free until the next one.
-  std::vector<std::uint64_t>& workspace() { return scratch_; }
+  Buffer<std::uint64_t>& workspace() { return scratch_; }
 
  private:
   struct Axis {
@@ -45,17 +45,16 @@ class SiteOrdering {
     bool finite = true;
   };
   bool make_axis(const Sites& sites, std::span<const std::uint32_t> live, std::size_t component, Axis& axis);
-  void draw_sample(const ParticleMasses& masses, ThreadPool* threads);
+  void draw_sample(const ParticleMasses& masses);
   ItemLayout line_items(const Sites& sites, std::span<const std::uint32_t> live);
   ItemLayout curve_items(const Sites& sites, std::span<const std::uint32_t> live);
 
   std::vector<Axis> axes_;
-  std::vector<Range> range_;          ///< each block of sites
-  std::vector<std::size_t> live_;     ///< likewise
-  std::vector<std::uint64_t> below_;  ///< likewise: its mass
+  std::vector<Range> range_;       ///< each block of sites
+  std::vector<std::size_t> live_;  ///< likewise
   std::vector<std::uint32_t> sample_;
   std::vector<double> sample_values_;
-  std::vector<std::uint64_t> items_, scratch_, keys_;
+  Buffer<std::uint64_t> items_, scratch_, keys_;
 };
 
 }  // namespace wienertree

@@ -30,6 +30,13 @@ void require_close(const std::vector<double>& log_weight, const ParticleMasses& 
     total += m.mass[i];
   }
   REQUIRE(total == m.particles << m.fraction_bits);
+  REQUIRE(m.chunk_mass.size() == (m.mass.size() + ParticleMasses::chunk - 1) / ParticleMasses::chunk);
+  for (std::size_t c = 0; c < m.chunk_mass.size(); ++c) {
+    const auto first = m.mass.begin() + static_cast<std::ptrdiff_t>(c * ParticleMasses::chunk);
+    const auto rest = m.mass.end() - first;
+    REQUIRE(std::accumulate(first, first + std::min<std::ptrdiff_t>(ParticleMasses::chunk, rest),
+                            std::uint64_t{0}) == m.chunk_mass[c]);
+  }
   REQUIRE(std::abs(m.log_total - static_cast<double>(largest + std::log(sum))) <=
           1e-14 + 1e-15 * std::abs(m.log_total));
 }
@@ -63,7 +70,7 @@ TEST_CASE("Weights that add up beyond the range of doubles in either direction")
   CHECK(m.mass[4] == 0);
   CHECK(m.log_total == 1e6 + std::log(2.5));
   assign_masses(std::vector<double>(4, -1e308), 4, m);
-  CHECK(m.mass == std::vector<std::uint64_t>(4, std::uint64_t{1} << m.fraction_bits));
+  CHECK(m.mass == Buffer<std::uint64_t>(4, std::uint64_t{1} << m.fraction_bits));
 }
 
 TEST_CASE("Weights that are no weights are refused, with the site and the value") {

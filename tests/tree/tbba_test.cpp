@@ -254,7 +254,7 @@ TEST_CASE("The iterated form goes down deep trees: totals, and one particle's pa
   ParticleMasses m;
   assign_masses(std::vector<double>{0.0}, N, m);
   for (std::uint32_t launch = 0; launch < 20; ++launch) {
-    std::vector<std::uint64_t> mass = m.mass, child_mass;
+    std::vector<std::uint64_t> mass(m.mass.begin(), m.mass.end()), child_mass;
     std::vector<std::uint32_t> count = {N}, child_count;
     std::vector<double> taken(3);
     double lone = 0;
