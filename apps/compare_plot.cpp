@@ -74,8 +74,8 @@ void draw_panel(Picture& picture, const std::vector<Contender>& contenders, cons
     labels.push_back({short_label(contenders[m].label), colour_of(m),
                       (panel.value[m].back() - panel.bottom) / (panel.top - panel.bottom)});
   }
-  picture.add(fmt::format("set yrange [{:.9g}:{:.9g}]\nset ylabel {} noenhanced", panel.bottom, panel.top,
-                          app::in_quotes(panel.title)));
+  picture.add(fmt::format("set yrange [{:.9g}:{:.9g}]", panel.bottom, panel.top));
+  picture.add(name_of_height(panel.title, 16.0 / width));
   picture.add(labels_at_right(std::move(labels), 18.0 / panel_height));
   picture.add(plot);
 }
@@ -112,8 +112,8 @@ std::string draw_comparison(Picture picture, const std::vector<Contender>& conte
     const double top = 1 - static_cast<double>(title_height + i * panel_height) / height;
     const double bottom = top - static_cast<double>(panel_height - 12) / height;
     picture.add(fmt::format("set tmargin at screen {:.4f}\nset bmargin at screen {:.4f}", top, bottom));
-    picture.add(i == 1 ? "set format x \"%g\"\nset xlabel \"t\"\nunset label"
-                       : "set format x \"\"\nunset xlabel");
+    picture.add(i == 1 ? "set format x \"%g\"\nunset label\n" + name_of_width("t", 14.0 / height)
+                       : "set format x \"\"");
     draw_panel(picture, contenders, time, i == 0 ? factors : chances,
                i == 0 && contenders.front().setup.launches > 1);
   }

@@ -59,9 +59,8 @@ bool smooth(const Posterior& posterior, std::size_t i) {
   return !posterior.dirac() && posterior.variance_of(i, 0) > 0;
 }
 
-// Nodes of next to no weight, which a tree keeps in its tails, would hide those that carry the law.
-std::vector<double> rug_of(const Posterior& posterior, std::size_t i) {
-  constexpr double least_weight = 1e-6;
+std::vector<double> rug_of(const Posterior& posterior, std::size_t i, RugOf which) {
+  const double least_weight = which == RugOf::all_nodes ? 0 : 1e-6;
   std::vector<double> ticks;
   const std::size_t stride = 1 + posterior.size() / most_ticks_of_a_rug;
   for (std::size_t n = 0; n < posterior.size(); n += stride)
@@ -73,11 +72,11 @@ std::vector<double> rug_of(const Posterior& posterior, std::size_t i) {
 }  // namespace
 
 std::vector<DensityPanel> density_panels(const std::vector<std::string>& states, const Posterior& posterior,
-                                         const Posterior* exact, const Posterior* prior) {
+                                         const Posterior* exact, const Posterior* prior, RugOf rug) {
   std::vector<DensityPanel> panels;
   for (std::size_t i = 0; i < states.size(); ++i) {
-    DensityPanel panel{states[i], histogram(posterior, i), {}, {}, {}, {}, {}};
-    if (posterior.dirac()) panel.rug = rug_of(posterior, i);
+    DensityPanel panel{states[i], histogram(posterior, i), {}, {}, {}, {}, {}, {}};
+    if (posterior.dirac()) panel.rug = rug_of(posterior, i, rug);
     if (exact != nullptr && smooth(*exact, i)) panel.exact = density_curve(*exact, i);
     if (prior != nullptr && smooth(*prior, i)) panel.prior = density_curve(*prior, i);
     if (prior != nullptr && prior->dirac()) panel.prior_nodes = histogram(*prior, i);

@@ -49,7 +49,7 @@ std::string labels_of(const DensityPanel& panel, bool inside) {
     if (drawn) labels.push_back({text, colour, 1.0});
   };
   add(true, panel.rug.empty() ? "filter" : "nodes, weighted", colour::blue);
-  add(panel.exact.has_value(), "exact posterior", colour::black);
+  add(panel.exact.has_value(), panel.prior || panel.prior_nodes ? "exact posterior" : "exact", colour::black);
   add(panel.prior.has_value(), "prior (dashed)", colour::grey);
   add(panel.prior_nodes.has_value(), "prior", colour::grey);
   add(panel.signal.has_value(), "true signal", colour::vermillion);
@@ -68,22 +68,40 @@ std::string upright(const std::string& data, double height, double line_width, c
                      line_width, colour);
 }
 
-void draw_panel(Picture& picture, const DensityPanel& panel, std::size_t number, bool narrow) {
+struct Extent {
+  double low = INFINITY, high = -INFINITY;
+  void include(double x) {
+    low = std::min(low, x);
+    high = std::max(high, x);
+  }
+};
+
+// Of all panels of the state, so that they can be compared.
+Extent extent_of(const std::vector<DensityPanel>& panels, const std::string& state) {
+  Extent extent;
+  for (const DensityPanel& panel : panels) {
+    if (panel.state != state) continue;
+    for (const Piece& piece : pieces_of(panel)) {
+      extent.include(piece.curve.x.front());
+      extent.include(piece.curve.x.back());
+    }
+    if (panel.signal) extent.include(*panel.signal);
+  }
+  return extent;
+}
+
+void draw_panel(Picture& picture, const DensityPanel& panel, const Extent& extent, std::size_t number,
+                bool narrow) {
   const std::vector<Piece> pieces = pieces_of(panel);
-  double low = INFINITY, high = -INFINITY, top = 0;
-  for (const Piece& piece : pieces) {
-    low = std::min(low, piece.curve.x.front());
-    high = std::max(high, piece.curve.x.back());
+  double top = 0;
+  for (const Piece& piece : pieces)
     top = std::max(top, *std::max_element(piece.curve.y.begin(), piece.curve.y.end()));
-  }
-  if (panel.signal) {
-    low = std::min(low, *panel.signal);
-    high = std::max(high, *panel.signal);
-  }
-  picture.add(fmt::format(
-      "set xrange [{:.9g}:{:.9g}]\nset yrange [0:{:.9g}]\nset xlabel {} noenhanced\nset ylabel \"density\"",
-      low, high, 1.12 * top, in_quotes(panel.state)));
+  picture.add(
+      fmt::format("set xrange [{:.9g}:{:.9g}]\nset yrange [0:{:.9g}]", extent.low, extent.high, 1.12 * top));
   picture.add(labels_of(panel, narrow));
+  if (!panel.title.empty())
+    picture.add(fmt::format("set label {} at graph 0.015,0.95 left noenhanced{}", in_quotes(panel.title),
+                            narrow ? " font \",11\"" : ""));
   std::string plot = "plot ";
   for (std::size_t k = 0; k < pieces.size(); ++k) {
     const std::string name = fmt::format("panel{}piece{}", number, k);
@@ -123,7 +141,10 @@ std::string draw_density(Picture picture, const std::string& title, const std::v
     const double bottom = top - static_cast<double>(panel_height - 60) / height;
     picture.add(fmt::format("set tmargin at screen {:.4f}\nset bmargin at screen {:.4f}", top, bottom));
     if (i > 0) picture.add("unset label");
-    draw_panel(picture, panels[static_cast<std::size_t>(i)], static_cast<std::size_t>(i), narrow);
+    const DensityPanel& panel = panels[static_cast<std::size_t>(i)];
+    picture.add(name_of_height("density", (narrow ? 9.0 : 16.0) / width));
+    picture.add(name_of_width(panel.state, bottom - 40.0 / height));
+    draw_panel(picture, panel, extent_of(panels, panel.state), static_cast<std::size_t>(i), narrow);
   }
   picture.add("unset multiplot");
   return picture.draw();

@@ -24,14 +24,20 @@ struct DensityPanel {
   std::optional<Curve> prior;  ///< exact prior density, where there is one
   std::optional<Histogram> prior_nodes;
   std::optional<double> signal;
+  std::string title;  ///< written into the panel, if not empty
 };
 
 void exchange(StateArchive& archive, DensityPanel& panel);
 
+/// Nodes of next to no weight, which a tree keeps in its tails, hide those that carry the law.
+enum class RugOf { nodes_of_weight, all_nodes };
+
 /// One panel for each of the first `states.size()` components. `exact` and `prior` may be null.
 std::vector<DensityPanel> density_panels(const std::vector<std::string>& states, const Posterior& posterior,
-                                         const Posterior* exact, const Posterior* prior);
+                                         const Posterior* exact, const Posterior* prior,
+                                         RugOf rug = RugOf::nodes_of_weight);
 
+/// Panels of one and the same state share the axis.
 /// @returns the bytes of the picture  @throws RunError if gnuplot fails
 /// `width` in pixels: below 640, names of curves stand inside the panel.
 std::string draw_density(Picture picture, const std::string& title, const std::vector<DensityPanel>& panels,

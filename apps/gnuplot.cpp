@@ -100,7 +100,8 @@ void Picture::begin(int width, int height) {
   else
     add(fmt::format("set terminal pngcairo size {},{} font \"Sans,12\" fontscale 1.9 enhanced linewidth 2",
                     2 * width, 2 * height));
-  add("set encoding utf8\nset border 3 lw 0.8 lc rgb \"#444444\"\nset tics nomirror out scale 0.6\nunset "
+  add("set encoding utf8\nset minussign\nset border 3 lw 0.8 lc rgb \"#444444\"\nset tics nomirror out scale "
+      "0.6\nunset "
       "key");
 }
 
@@ -146,6 +147,15 @@ std::string in_quotes(const std::string& text) {
     out += c == '\n' ? ' ' : c;
   }
   return out + '"';
+}
+
+std::string name_of_height(const std::string& text, double x) {
+  return fmt::format("set label {} at screen {:.4f}, graph 0.5 center rotate by 90 noenhanced",
+                     in_quotes(text), x);
+}
+
+std::string name_of_width(const std::string& text, double y) {
+  return fmt::format("set label {} at graph 0.5, screen {:.4f} center noenhanced", in_quotes(text), y);
 }
 
 std::string labels_at_right(std::vector<SideLabel> labels, double spacing) {

@@ -41,6 +41,11 @@ class Picture {
 /// Text between double quotes, for a place marked `noenhanced`.
 std::string in_quotes(const std::string& text);
 
+/// Names of the axes of a panel, in the middle of its side: `x` and `y` are parts of the picture, since where
+/// gnuplot itself puts them depends on the terminal's idea of the font.
+std::string name_of_height(const std::string& text, double x);
+std::string name_of_width(const std::string& text, double y);
+
 /// A text beside the place it names.
 struct SideLabel {
   std::string text;

@@ -81,8 +81,8 @@ std::string labels_of(const PosteriorPanel& panel, const Range& range, double sp
 
 void draw_panel(Picture& picture, const PosteriorPanel& panel, std::size_t number, int panel_height) {
   const Range range = range_of(panel);
-  picture.add(fmt::format("set yrange [{:.9g}:{:.9g}]\nset ylabel {} noenhanced", range.low, range.high,
-                          in_quotes(panel.state)));
+  picture.add(fmt::format("set yrange [{:.9g}:{:.9g}]", range.low, range.high));
+  picture.add(name_of_height(panel.state, 22.0 / width));
   picture.add(labels_of(panel, range, 18.0 / panel_height));
   const std::string id = fmt::format("panel{}", number);
   add_curves(picture, id, {&panel.filter.time, &panel.filter.low, &panel.filter.high, &panel.filter.mean});
@@ -126,8 +126,9 @@ std::string draw_posterior(Picture picture, const std::string& title,
     const double top = 1 - static_cast<double>(title_height + i * panel_height) / height;
     const double bottom = top - static_cast<double>(panel_height - 12) / height;
     picture.add(fmt::format("set tmargin at screen {:.4f}\nset bmargin at screen {:.4f}", top, bottom));
-    picture.add(i + 1 == count ? "set format x \"%g\"\nset xlabel \"t\"" : "set format x \"\"\nunset xlabel");
     if (i > 0) picture.add("unset label");
+    picture.add(i + 1 == count ? "set format x \"%g\"\n" + name_of_width("t", 14.0 / height)
+                               : "set format x \"\"");
     PosteriorPanel panel = panels[static_cast<std::size_t>(i)];
     if (panel.signal) panel.signal = within(*panel.signal, time.front(), time.back());
     draw_panel(picture, panel, static_cast<std::size_t>(i), panel_height);

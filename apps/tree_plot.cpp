@@ -83,8 +83,8 @@ void draw_panel(Picture& picture, const Genealogy& g, std::size_t component, boo
       high = std::max(high, nodes[1][i]);
     }
   const double margin = high > low ? 0.08 * (high - low) : std::max(1e-9, 0.1 * std::fabs(low));
-  picture.add(fmt::format("set yrange [{:.9g}:{:.9g}]\nset ylabel {} noenhanced", low - margin, high + margin,
-                          in_quotes(g.state_names()[component])));
+  picture.add(fmt::format("set yrange [{:.9g}:{:.9g}]", low - margin, high + margin));
+  picture.add(name_of_height(g.state_names()[component], 22.0 / width));
   const std::string id = fmt::format("state{}", component);
   picture.add_data(id, nodes);
   picture.add_data(id + "edges", edges_of(g, component));
@@ -122,8 +122,9 @@ std::string draw_tree(Picture picture, const std::string& title, const Genealogy
     const double top = 1 - static_cast<double>(title_height + i * each) / height;
     const double bottom = top - static_cast<double>(each - 12) / height;
     picture.add(fmt::format("set tmargin at screen {:.4f}\nset bmargin at screen {:.4f}", top, bottom));
-    picture.add(i + 1 == count ? "set format x \"%g\"\nset xlabel \"t\"" : "set format x \"\"\nunset xlabel");
     if (i > 0) picture.add("unset label\nunset colorbox");
+    picture.add(i + 1 == count ? "set format x \"%g\"\n" + name_of_width("t", 14.0 / height)
+                               : "set format x \"\"");
     draw_panel(picture, g, static_cast<std::size_t>(i), likely);
   }
   picture.add("unset multiplot");

@@ -117,9 +117,10 @@ std::vector<DensityPanel> density_panels_of(const Study& study, const StudyPlot&
     run_until(*filter, data.windows(*cell.filter, data.observations(cell, 0)), cell.filter->until);
     std::optional<Posterior> exact;
     if (truth.posterior) exact = truth.posterior->view();
-    panels.push_back(density_panels({series.empty() ? cell.key : series}, filter->posterior(),
-                                    exact ? &*exact : nullptr, nullptr)
+    panels.push_back(density_panels({cell.filter->model->state_names.front()}, filter->posterior(),
+                                    exact ? &*exact : nullptr, nullptr, RugOf::all_nodes)
                          .front());
+    panels.back().title = series.empty() ? cell.key : series;
   }
   return panels;
 }

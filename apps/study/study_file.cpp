@@ -174,18 +174,28 @@ std::vector<StudySeries> read_series(const Section& root) {
   return all;
 }
 
+// None where the key is absent.
+std::vector<std::string> series_labels(const Section& section, std::string_view key, const Study& study) {
+  if (!section.has(key)) return {};
+  const std::vector<std::string> labels = texts(section, key);
+  std::vector<std::string> known;
+  for (const StudySeries& series : study.series) known.push_back(series.label);
+  for (const std::string& label : labels)
+    if (std::find(known.begin(), known.end(), label) == known.end())
+      throw InputError("no series has this label" + text::suggestion(label, known),
+                       section.location(key).text(), label);
+  return labels;
+}
+
 StudyPlot read_plot(const Section& section, const Study& study) {
   section.only({"title", "kind", "x", "along", "y", "quantity", "x_label", "y_label", "series", "fit",
-                "log_x", "log_y"});
+                "log_x", "log_y", "unfitted"});
   StudyPlot plot;
   plot.where = section.location().text();
   plot.title = string_or(section, "title", "");
   plot.density = section.has("kind") && section.choice("kind", {"error", "density"}) == 1;
-  if (section.has("series")) plot.series = texts(section, "series");
-  for (const std::string& label : plot.series)
-    if (std::none_of(study.series.begin(), study.series.end(),
-                     [&](const auto& s) { return s.label == label; }))
-      throw InputError("no series has this label", section.location("series").text(), label);
+  plot.series = series_labels(section, "series", study);
+  plot.unfitted = series_labels(section, "unfitted", study);
   if (plot.density) return plot;
   plot.x = section.string("x");
   plot.along = string_or(section, "along", plot.x);

@@ -54,6 +54,7 @@ struct StudyPlot {
   std::vector<std::string> series;  ///< labels; empty: all
   bool fit = true;
   std::optional<std::pair<double, double>> fit_range;  ///< of x
+  std::vector<std::string> unfitted;                   ///< labels of series whose lines have no slope
   bool log_x = true, log_y = true;
   std::string where;
 };

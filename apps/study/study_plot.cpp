@@ -14,15 +14,16 @@ struct Style {
   const char* colour;
   int point;  ///< gnuplot's filled circle, square, triangles, diamond; then the open ones
   const char* band;
+  const char* text;  ///< darker where the colour is too light for letters on white
 };
 // Yellow of Okabe and Ito is left out: as a line on white it is hard to see.
-constexpr std::array<Style, 7> styles = {{{colour::blue, 7, "#D00072B2"},
-                                          {colour::vermillion, 5, "#D0D55E00"},
-                                          {colour::green, 9, "#D0009E73"},
-                                          {colour::orange, 13, "#D0E69F00"},
-                                          {"#CC79A7", 11, "#D0CC79A7"},
-                                          {colour::sky, 7, "#D056B4E9"},
-                                          {colour::black, 4, "#D0000000"}}};
+constexpr std::array<Style, 7> styles = {{{colour::blue, 7, "#D00072B2", colour::blue},
+                                          {colour::vermillion, 5, "#D0D55E00", "#B85000"},
+                                          {colour::green, 9, "#D0009E73", "#007A59"},
+                                          {colour::orange, 13, "#D0E69F00", "#946600"},
+                                          {"#CC79A7", 11, "#D0CC79A7", "#A84E80"},
+                                          {colour::sky, 7, "#D056B4E9", "#1A78AE"},
+                                          {colour::black, 4, "#D0000000", colour::black}}};
 
 struct Range {
   double low = INFINITY, high = -INFINITY;
@@ -51,18 +52,36 @@ bool drawable(const LinePoint& p, const StudyPlot& plot) {
   return std::isfinite(p.y.value) && (!plot.log_x || p.x > 0) && (!plot.log_y || p.y.value > 0);
 }
 
+bool is_power_of_ten(double v) {
+  const double exponent = std::log10(v);
+  return std::fabs(exponent - std::round(exponent)) < 1e-9;
+}
+
+std::string with_minus_sign(const std::string& number) {
+  return number.starts_with('-') ? "\u2212" + number.substr(1) : number;
+}
+
 std::string tic_text(double v) {
   if (v >= 1e-3 && v < 1e5) return fmt::format("{:g}", v);
-  return fmt::format("{:.0e}", v);
+  const double exponent = std::floor(std::log10(v) + 1e-9);
+  const std::string power = fmt::format("10^{{{}}}", with_minus_sign(fmt::format("{:.0f}", exponent)));
+  return is_power_of_ten(v) ? power : fmt::format("{:g}·{}", v / std::pow(10.0, exponent), power);
 }
 
 // Decades, and 2 and 5 between them where there are few.
 std::string logarithmic_tics(const Range& range, const std::vector<double>& wanted) {
   std::vector<double> at;
   if (!wanted.empty()) {
-    const double least = std::pow(range.high / range.low, 0.055);
-    for (const double v : wanted)
-      if (at.empty() || v / at.back() > least) at.push_back(v);
+    // Powers of ten before others that stand too near to them.
+    const double least = std::log(range.high / range.low) * 0.055;
+    const auto take = [&](bool powers) {
+      for (const double v : wanted)
+        if (is_power_of_ten(v) == powers &&
+            std::all_of(at.begin(), at.end(), [&](double a) { return std::fabs(std::log(v / a)) > least; }))
+          at.push_back(v);
+    };
+    take(true);
+    take(false);
   } else {
     const double decades = std::log10(range.high / range.low);
     const std::vector<double> steps = decades < 2.5 ? std::vector<double>{1, 2, 5} : std::vector<double>{1};
@@ -74,10 +93,7 @@ std::string logarithmic_tics(const Range& range, const std::vector<double>& want
   }
   std::vector<std::string> tics;
   for (const double v : at) {
-    const double exponent = std::log10(v);
-    const bool power = std::fabs(exponent - std::round(exponent)) < 1e-9 && (v < 1e-3 || v >= 1e5);
-    tics.push_back(
-        fmt::format("\"{}\" {:.12g}", power ? fmt::format("10^{{{:.0f}}}", exponent) : tic_text(v), v));
+    tics.push_back(fmt::format("\"{}\" {:.12g}", tic_text(v), v));
   }
   return fmt::format("({})", fmt::join(tics, ", "));
 }
@@ -160,8 +176,8 @@ std::size_t longest(const std::vector<PlotLine>& lines) {
 
 std::string slope_text(const SlopeFit& fit) {
   const double half = (fit.slope_high - fit.slope_low) / 2;
-  return std::isnan(half) ? fmt::format("{:.2f}", fit.slope)
-                          : fmt::format("{:.2f} ± {:.2f}", fit.slope, half);
+  const std::string slope = with_minus_sign(fmt::format("{:.2f}", fit.slope));
+  return std::isnan(half) ? slope : fmt::format("{} ± {:.2f}", slope, half);
 }
 
 std::string draw_study_plot(Picture picture, const StudyPlot& plot, const std::vector<PlotLine>& lines,
@@ -191,18 +207,15 @@ std::string draw_study_plot(Picture picture, const StudyPlot& plot, const std::v
   if (plot.log_x) picture.add("set xtics " + logarithmic_tics(frame.x, frame.x_values));
   if (plot.log_y) picture.add("set ytics " + logarithmic_tics(frame.y, {}));
   picture.add("set grid xtics ytics lt 1 lw 0.6 lc rgb \"#E4E4E4\"");
-  // The label of the axis at a place of its own: gnuplot's depends on the terminal's idea of the font.
-  picture.add(fmt::format("set label {} at screen {:.4f},{:.4f} center noenhanced", in_quotes(x_label(plot)),
-                          (left + width - right) / 2 / width, static_cast<double>(key_height + 16) / height));
-  picture.add(
-      fmt::format("set ylabel {} noenhanced{}", in_quotes(y_label(plot)), wide ? "" : " offset 1.5,0"));
+  picture.add(name_of_width(x_label(plot), static_cast<double>(key_height + 16) / height));
+  picture.add(name_of_height(y_label(plot), (wide ? 16.0 : 10.0) / width));
   std::vector<SideLabel> labels;
   for (std::size_t i = 0; i < lines.size(); ++i) {
     const Style& style = styles[i % styles.size()];
     double at = 0.5;
     for (const LinePoint& p : lines[i].points)
       if (drawable(p, plot)) at = frame.y.fraction(p.y.value, plot.log_y);
-    labels.push_back({text_of(lines[i]), style.colour, at});
+    labels.push_back({text_of(lines[i]), style.text, at});
     add_line(picture, lines[i], plot, frame.y.low, i);
     if (wide) continue;
     const double y = static_cast<double>(key_height - 12 - key_line * static_cast<int>(i)) / height;
@@ -210,7 +223,7 @@ std::string draw_study_plot(Picture picture, const StudyPlot& plot, const std::v
         fmt::format("set label {} at screen 0.07,{:.4f} left textcolor rgb \"{}\" noenhanced font \",12\" "
                     "point pt {} ps 0.8 lc "
                     "rgb \"{}\" offset 1.2,0",
-                    in_quotes(text_of(lines[i])), y, style.colour, style.point, style.colour));
+                    in_quotes(text_of(lines[i])), y, style.text, style.point, style.colour));
   }
   if (wide) picture.add(labels_at_right(std::move(labels), 19.0 / (height - title_height - 64)));
   std::vector<std::string> pieces;

@@ -120,6 +120,7 @@ void fit_line(const StudyPlot& plot, PlotLine& line) {
 std::vector<PlotLine> lines_of(const Study& study, const StudyPlot& plot,
                                const std::vector<StudyPoint>& points) {
   std::vector<PlotLine> lines;
+  std::vector<bool> fitted;
   if (plot.density) return lines;
   const auto quantity = static_cast<std::size_t>(
       std::find(study.quantities.begin(), study.quantities.end(), plot.quantity) - study.quantities.begin());
@@ -132,14 +133,18 @@ std::vector<PlotLine> lines_of(const Study& study, const StudyPlot& plot,
       continue;
     const std::string label = label_of(study, point, plot.along);
     auto line = std::find_if(lines.begin(), lines.end(), [&](const PlotLine& l) { return l.label == label; });
-    if (line == lines.end()) line = lines.insert(lines.end(), {label, {}, {}});
+    if (line == lines.end()) {
+      line = lines.insert(lines.end(), {label, {}, {}});
+      fitted.push_back(plot.fit &&
+                       std::find(plot.unfitted.begin(), plot.unfitted.end(), series) == plot.unfitted.end());
+    }
     line->points.push_back({number_on_axis(point, plot.x, plot), number_on_axis(point, plot.along, plot),
                             point.errors[quantity * study.measures.size() + measure]});
   }
-  for (PlotLine& line : lines) {
-    std::stable_sort(line.points.begin(), line.points.end(),
+  for (std::size_t l = 0; l < lines.size(); ++l) {
+    std::stable_sort(lines[l].points.begin(), lines[l].points.end(),
                      [](const auto& a, const auto& b) { return a.along < b.along; });
-    if (plot.fit) fit_line(plot, line);
+    if (fitted[l]) fit_line(plot, lines[l]);
   }
   return lines;
 }
