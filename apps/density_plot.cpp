@@ -136,6 +136,7 @@ std::string draw_density(Picture picture, const std::string& title, const std::v
                           in_quotes(title), 1 - 0.55 * title_height / height, narrow ? 11 : 14));
   picture.add(fmt::format("set lmargin at screen {:.4f}\nset rmargin at screen {:.4f}",
                           (narrow ? 60.0 : 86.0) / width, 1 - (narrow ? 14.0 : 150.0) / width));
+  if (narrow) picture.add("set tics font \",11\"");
   for (int i = 0; i < count; ++i) {
     const double top = 1 - static_cast<double>(title_height + i * panel_height) / height;
     const double bottom = top - static_cast<double>(panel_height - 60) / height;
@@ -143,7 +144,7 @@ std::string draw_density(Picture picture, const std::string& title, const std::v
     if (i > 0) picture.add("unset label");
     const DensityPanel& panel = panels[static_cast<std::size_t>(i)];
     picture.add(name_of_height("density", (narrow ? 9.0 : 16.0) / width));
-    picture.add(name_of_width(panel.state, bottom - 40.0 / height));
+    picture.add(name_of_width(panel.state, bottom - 44.0 / height));
     draw_panel(picture, panel, extent_of(panels, panel.state), static_cast<std::size_t>(i), narrow);
   }
   picture.add("unset multiplot");

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdint>
@@ -26,7 +27,6 @@ figure { margin: 1.2rem 0; }
 figure svg { width: 100%; height: auto; display: block; }
 figcaption { font-size: .85rem; color: #555; }
 .narrow { display: none; }
-@media (max-width: 640px) { .wide { display: none; } .narrow { display: block; } .scroll { margin: 0 -1rem; padding: 0 1rem; } }
 .scroll { overflow-x: auto; }
 table { border-collapse: collapse; font-size: .85rem; font-variant-numeric: tabular-nums; overflow-wrap: normal; }
 th, td { padding: .25rem .6rem; text-align: right; border-bottom: 1px solid #ddd; white-space: nowrap; }
@@ -36,6 +36,13 @@ td.wrap { white-space: normal; min-width: 14rem; overflow-wrap: normal; }
 td.yes { color: #00634A; } td.no { color: #A34700; }
 pre { overflow-x: auto; font-size: .8rem; background: #f6f6f6; padding: .8rem; }
 a { color: #0060A0; }
+@media (max-width: 640px) {
+  .wide { display: none; } .narrow { display: block; } .scroll { margin: 0 -1rem; padding: 0 1rem; }
+  th, td { padding: .25rem .35rem; } td.wrap { min-width: 7rem; }
+  .claims tr { display: block; padding: .4rem 0; border-bottom: 1px solid #ddd; } .claims tr:first-child { display: none; }
+  .claims td { display: inline; border: 0; padding: 0 .3rem 0 0; white-space: normal; } .claims td.wrap { display: block; }
+  .claims td[data-name]:not(:empty)::before { content: attr(data-name) " "; color: #666; }
+}
 footer { margin-top: 3rem; font-size: .8rem; color: #666; }
 )";
 
@@ -99,7 +106,8 @@ std::string interval(double low, double high, int digits = 3) {
              : fmt::format("{} … {}", number(low, digits), number(high, digits));
 }
 
-std::string figure(const StudyPlot& plot, const StudyPicture& picture, std::size_t n) {
+std::string figure(const StudyPlot& plot, const std::vector<PlotLine>& lines, const StudyPicture& picture,
+                   std::size_t n) {
   const std::string what = plot.title.empty() ? fmt::format("plot {}", n) : plot.title;
   std::string html =
       fmt::format("<figure>\n<div class=\"{}\">{}</div>\n", picture.narrow.empty() ? "both" : "wide",
@@ -107,24 +115,28 @@ std::string figure(const StudyPlot& plot, const StudyPicture& picture, std::size
   if (!picture.narrow.empty())
     html += fmt::format("<div class=\"narrow\">{}</div>\n",
                         inlined(picture.narrow, fmt::format("n{}-", n), what));
-  const std::string lines =
-      plot.density ? "" : "Shaded: 95 % confidence. Dashed: fitted line; its slope stands beside the name. ";
+  const auto has_fit = [](const PlotLine& line) { return line.fit.has_value(); };
+  std::string explained = plot.density ? "" : "Shaded: 95 % confidence. ";
+  if (std::any_of(lines.begin(), lines.end(), has_fit))
+    explained += "Dashed: fitted line; its slope stands beside the name. ";
   return html + fmt::format(
                     "<figcaption>{}<a href=\"{}\">PNG</a>, <a "
                     "href=\"plot-{}.svg\">SVG</a></figcaption>\n</figure>\n",
-                    lines, picture.png, n);
+                    explained, picture.png, n);
 }
 
 std::string claims_section(const Study& study, const StudyResults& results) {
   if (study.claims.empty()) return {};
   std::string html =
-      "<h2>What is claimed, and what these numbers say</h2>\n<div class=\"scroll\"><table>\n<tr><th "
+      "<h2>What is claimed, and what these numbers say</h2>\n<div class=\"scroll\"><table "
+      "class=\"claims\">\n<tr><th "
       "class=\"text\">claim</th><th>found</th><th>95 "
       "%</th><th>claimed</th><th class=\"text\"></th></tr>\n";
   for (std::size_t c = 0; c < study.claims.size(); ++c) {
     const ClaimOutcome& o = results.claims[c];
     html += fmt::format(
-        "<tr><td class=\"text wrap\">{}</td><td>{}</td><td>{}</td><td>{} … {}</td><td class=\"text "
+        "<tr><td class=\"text wrap\">{}</td><td data-name=\"found\">{}</td><td data-name=\"95 %\">{}</td><td "
+        "data-name=\"claimed\">{} … {}</td><td class=\"text "
         "{}\">{}</td></tr>\n",
         escaped(study.claims[c].text), number(o.value), interval(o.low, o.high), number(study.claims[c].low),
         number(study.claims[c].high), o.inside ? "yes" : "no", o.inside ? "holds" : "does not hold");
@@ -195,7 +207,8 @@ std::string study_page(const Study& study, const StudyResults& results,
     html += fmt::format("<p><span class=\"who\">Published:</span> {}</p>\n", escaped(study.paper));
   if (!study.finding.empty())
     html += fmt::format("<p><span class=\"who\">Found:</span> {}</p>\n", escaped(study.finding));
-  for (std::size_t p = 0; p < pictures.size(); ++p) html += figure(study.plots[p], pictures[p], p + 1);
+  for (std::size_t p = 0; p < pictures.size(); ++p)
+    html += figure(study.plots[p], results.lines[p], pictures[p], p + 1);
   html += claims_section(study, results) + slopes_section(study, results) + table_section(study, results) +
           downloads_section(downloads);
   html += fmt::format("<h2>Study file</h2>\n<details><summary>{}.toml</summary>\n<pre>{}</pre></details>\n",

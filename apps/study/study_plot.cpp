@@ -141,6 +141,21 @@ void add_line(Picture& picture, const PlotLine& line, const StudyPlot& plot, dou
       std::array{std::vector{*low, *high}, std::vector{line.fit->at(*low), line.fit->at(*high)}});
 }
 
+// Lines of so many letters at most, where words allow it.
+std::vector<std::string> wrapped(const std::string& text, std::size_t letters) {
+  std::vector<std::string> lines;
+  for (std::size_t begin = 0; begin < text.size();) {
+    std::size_t end = text.size();
+    if (end - begin > letters) {
+      end = text.rfind(' ', begin + letters);
+      if (end == std::string::npos || end <= begin) end = std::min(text.find(' ', begin), text.size());
+    }
+    lines.push_back(text.substr(begin, end - begin));
+    begin = end + 1;
+  }
+  return lines;
+}
+
 std::string text_of(const PlotLine& line) {
   return line.fit ? fmt::format("{}: {}", line.label, slope_text(*line.fit)) : line.label;
 }
@@ -185,7 +200,8 @@ std::string draw_study_plot(Picture picture, const StudyPlot& plot, const std::v
   const bool wide = shape == PlotShape::wide;
   const Frame frame = frame_of(plot, lines);
   const int key_line = 20, key_height = wide ? 0 : key_line * static_cast<int>(lines.size()) + 10;
-  const int title_height = plot.title.empty() ? 16 : 44;
+  const std::vector<std::string> title = wide ? std::vector{plot.title} : wrapped(plot.title, 46);
+  const int title_height = wide ? (plot.title.empty() ? 16 : 44) : 18 * static_cast<int>(title.size()) + 34;
   const int width = wide ? 900 : 400, height = title_height + (wide ? 464 : 308) + key_height;
   const double left = wide ? 92 : 66,
                right = wide ? std::min(360.0, 20 + 7.4 * static_cast<double>(longest(lines))) : 14;
@@ -196,10 +212,11 @@ std::string draw_study_plot(Picture picture, const StudyPlot& plot, const std::v
       fmt::format("set lmargin at screen {:.4f}\nset rmargin at screen {:.4f}\nset tmargin at screen {:.4f}\n"
                   "set bmargin at screen {:.4f}",
                   left / width, 1 - right / width, top, bottom));
-  if (!plot.title.empty())
-    picture.add(fmt::format("set label 1 {} at screen {:.4f},{:.4f} left noenhanced font \",{}\"",
-                            in_quotes(plot.title), wide ? left / width : 0.02,
-                            1 - 0.5 * title_height / height, wide ? 15 : 12));
+  for (std::size_t i = 0; i < title.size(); ++i)
+    picture.add(fmt::format("set label {} at screen {:.4f},{:.4f} left noenhanced font \",{}\"",
+                            in_quotes(title[i]), wide ? left / width : 0.02,
+                            1 - (wide ? 0.5 * title_height : 14 + 18.0 * static_cast<double>(i)) / height,
+                            wide ? 15 : 12));
   if (plot.log_x) picture.add("set logscale x");
   if (plot.log_y) picture.add("set logscale y");
   picture.add(fmt::format("set xrange [{:.9g}:{:.9g}]\nset yrange [{:.9g}:{:.9g}]", frame.x.low, frame.x.high,
@@ -208,7 +225,12 @@ std::string draw_study_plot(Picture picture, const StudyPlot& plot, const std::v
   if (plot.log_y) picture.add("set ytics " + logarithmic_tics(frame.y, {}));
   picture.add("set grid xtics ytics lt 1 lw 0.6 lc rgb \"#E4E4E4\"");
   picture.add(name_of_width(x_label(plot), static_cast<double>(key_height + 16) / height));
-  picture.add(name_of_height(y_label(plot), (wide ? 16.0 : 10.0) / width));
+  if (wide)
+    picture.add(name_of_height(y_label(plot), 16.0 / width));
+  else  // above the axis, where there is room for a long name
+    picture.add(
+        fmt::format("set tics font \",11\"\nset label {} at screen 0.02,{:.4f} left noenhanced font \",11\"",
+                    in_quotes(y_label(plot)), 1 - (title_height - 14.0) / height));
   std::vector<SideLabel> labels;
   for (std::size_t i = 0; i < lines.size(); ++i) {
     const Style& style = styles[i % styles.size()];
