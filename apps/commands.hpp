@@ -12,5 +12,6 @@ void add_model_command(CLI::App& program);
 void add_tree_command(CLI::App& program);
 void add_weak_command(CLI::App& program);
 void add_study_command(CLI::App& program);
+void add_format_command(CLI::App& program);
 
 }  // namespace wienertree::app

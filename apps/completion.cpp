@@ -64,6 +64,8 @@ std::string bash_positional(const CommandPath& command) {
   for (const CLI::Option* option : options_of(*command.app)) {
     if (!option->get_lnames().empty()) continue;
     switch (kind_of(*option)) {
+      case Kind::words:
+        return fmt::format("words=\"{}\"", fmt::join(choices_of(*option), " "));
       case Kind::model:
         return "words=$(\"$program\" model list 2>/dev/null | awk 'NR > 1 { print $1 }'); files=yes";
       case Kind::formula:
@@ -147,6 +149,9 @@ std::string fish_completion(const CLI::App& program) {
     for (const CLI::Option* option : options_of(*command.app)) {
       if (option->get_lnames().empty()) {
         const Kind kind = kind_of(*option);
+        if (kind == Kind::words)
+          text += fmt::format("complete -c wienertree -n {} -f -a {}\n", fish_quoted(within),
+                              fish_quoted(fmt::format("{}", fmt::join(choices_of(*option), " "))));
         if (kind == Kind::model || kind == Kind::formula)
           text += fmt::format("complete -c wienertree -n {} -a {}\n", fish_quoted(within),
                               fish_quoted(fmt::format(

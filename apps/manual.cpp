@@ -1,5 +1,6 @@
 #include <fmt/format.h>
 
+#include "file_format.hpp"
 #include "pages.hpp"
 #include "wienertree/version.hpp"
 
@@ -139,6 +140,9 @@ std::string manual_page(const CLI::App& program) {
   text += opening;
   for (const CommandPath& command : commands)
     if (all_commands(*command.app).empty()) text += section(command);
+  text += ".SH FILE FORMATS\n";
+  for (const FileFormat& format : file_formats())
+    text += fmt::format(".SS The file: {}\n.nf\n{}\n.fi\n", format.name, troff(format_text(format)));
   return text + closing;
 }
 

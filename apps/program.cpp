@@ -24,6 +24,7 @@ void describe_program(CLI::App& program) {
   add_formulas_command(program);
   add_model_command(program);
   add_tree_command(program);
+  add_format_command(program);
 }
 
 }  // namespace wienertree::app

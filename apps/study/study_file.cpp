@@ -8,6 +8,7 @@
 #include <limits>
 #include <sstream>
 
+#include "study_keys.hpp"
 #include "wienertree/model/text/toml_section.hpp"
 
 namespace wienertree::app {
@@ -92,10 +93,11 @@ void put(StudyOptions& options, StudyOption option) {
     *there = std::move(option);
 }
 
-StudyOptions read_options(const Section& section, std::initializer_list<std::string_view> other_keys = {}) {
+StudyOptions read_options(const Section& section, std::span<const FileKey> other_keys = {}) {
+  const std::vector<std::string> others = names_of(other_keys);
   StudyOptions options;
   for (const std::string& key : section.keys()) {
-    if (std::find(other_keys.begin(), other_keys.end(), key) != other_keys.end()) continue;
+    if (std::find(others.begin(), others.end(), key) != others.end()) continue;
     if (key == "set") {
       const Section parameters = section.section(key);
       for (const std::string& name : parameters.keys())
@@ -108,10 +110,12 @@ StudyOptions read_options(const Section& section, std::initializer_list<std::str
 }
 
 StudyObservations read_observation_spec(const Section& section) {
-  section.only({"file", "model", "horizon", "steps", "keep", "paths", "seed"});
+  section.only(observations_keys);
   StudyObservations o;
   if (section.has("file")) {
-    section.only({"file"});
+    for (const std::string& key : section.keys())
+      if (key != "file")
+        throw InputError("belongs to simulated records; `file` stands alone", section.location(key).text());
     o.file = section.string("file");
     return o;
   }
@@ -136,7 +140,7 @@ StudyReference read_reference(const Section& root) {
     return reference;
   }
   const Section section = root.section("reference");
-  section.only({"by_payoff", "run"});
+  section.only(reference_keys);
   if (section.has("run") == section.has("by_payoff"))
     throw InputError(
         "must be \"exact\", \"none\", a number, an expression, or a table with `run` or `by_payoff`",
@@ -164,8 +168,7 @@ std::vector<StudySeries> read_series(const Section& root) {
   for (const Section& section : root.sections("series")) {
     StudySeries series{section.string("label"), shared, launches_of(section, launches),
                        section.location().text()};
-    for (StudyOption& option : read_options(section, {"label", "launches"}))
-      put(series.options, std::move(option));
+    for (StudyOption& option : read_options(section, series_keys)) put(series.options, std::move(option));
     for (const StudySeries& other : all)
       if (other.label == series.label)
         throw InputError("two series have this label", series.where, series.label);
@@ -188,8 +191,7 @@ std::vector<std::string> series_labels(const Section& section, std::string_view 
 }
 
 StudyPlot read_plot(const Section& section, const Study& study) {
-  section.only({"title", "kind", "x", "along", "y", "quantity", "x_label", "y_label", "series", "fit",
-                "log_x", "log_y", "unfitted"});
+  section.only(plot_keys);
   StudyPlot plot;
   plot.where = section.location().text();
   plot.title = string_or(section, "title", "");
@@ -223,7 +225,7 @@ StudyPlot read_plot(const Section& section, const Study& study) {
 }
 
 StudyClaim read_claim(const Section& section, const Study& study) {
-  section.only({"text", "plot", "slope", "ratio", "at", "to", "to_at", "within", "holds"});
+  section.only(claim_keys);
   StudyClaim claim;
   claim.where = section.location().text();
   claim.text = section.string("text");
@@ -245,8 +247,7 @@ StudyClaim read_claim(const Section& section, const Study& study) {
 }
 
 Study read(const Section& root, bool full) {
-  root.only({"title", "paper", "finding", "command", "quantity", "measure", "launches", "reference",
-             "observations", "options", "series", "pool", "plot", "claim"});
+  root.only(std::span(study_keys).first(study_keys.size() - 1));  // [full] has been taken out
   Study study;
   study.full = full;
   study.title = root.string("title");

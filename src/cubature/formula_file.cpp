@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include "wienertree/cubature/formula_keys.hpp"
 #include "wienertree/cubature/json_fields.hpp"
 #include "wienertree/model/error.hpp"
 
@@ -11,7 +12,7 @@ namespace {
 using json::Json;
 
 CubaturePath path_from(const Json& object, int p, const std::string& where) {
-  json::check_keys(object, {"weight", "segments"}, where);
+  json::check_keys(object, path_keys, where);
   CubaturePath path;
   path.weight = json::number(object.at("weight"), "\"weight\"", where);
   const Json& segments = json::array_at(object, "segments", where);
@@ -36,7 +37,7 @@ CubatureFormula parse_formula(const std::string& text, const std::string& where)
   const Json root = json::parse(text, where);
   if (root.is_object() && root.value("kind", Json()) == "lie")
     throw InputError("this is a formula of Lie polynomials, not of paths", where);
-  json::check_keys(root, {"name", "degree", "dimension", "source", "paths"}, where);
+  json::check_keys(root, formula_keys, where);
   CubatureFormula formula;
   formula.name = json::string_at(root, "name", where);
   formula.source = json::string_at(root, "source", where);

@@ -53,13 +53,14 @@ std::string brief(const Json& value) {
   return text.size() <= 40 ? text : text.substr(0, 37) + "...";
 }
 
-void check_keys(const Json& object, std::initializer_list<std::string_view> keys, const std::string& where) {
+void check_keys(const Json& object, std::span<const FileKey> keys, const std::string& where) {
+  const std::vector<std::string> names = names_of(keys);
   if (!object.is_object()) throw InputError("an object was expected", where, brief(object));
   for (const auto& [key, value] : object.items()) {
-    if (std::find(keys.begin(), keys.end(), key) == keys.end())
-      throw InputError(fmt::format("unknown key; the keys are {}", fmt::join(keys, ", ")), where, key);
+    if (std::find(names.begin(), names.end(), key) == names.end())
+      throw InputError(fmt::format("unknown key; the keys are {}", fmt::join(names, ", ")), where, key);
   }
-  for (const std::string_view key : keys) {
+  for (const std::string& key : names) {
     if (!object.contains(key)) throw InputError(fmt::format("the key \"{}\" is missing", key), where);
   }
 }

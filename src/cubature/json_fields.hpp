@@ -1,10 +1,12 @@
 #pragma once
 /// Reading JSON with messages that name the place and the key, for formula_file.cpp and lie_formula_file.cpp.
 #include <filesystem>
-#include <initializer_list>
 #include <nlohmann/json.hpp>
+#include <span>
 #include <string>
 #include <string_view>
+
+#include "wienertree/model/file_key.hpp"
 
 namespace wienertree::json {
 
@@ -19,7 +21,7 @@ Json parse(const std::string& text, const std::string& where);
 std::string brief(const Json& value);
 
 /// @throws InputError unless `object` is an object with exactly these keys
-void check_keys(const Json& object, std::initializer_list<std::string_view> keys, const std::string& where);
+void check_keys(const Json& object, std::span<const FileKey> keys, const std::string& where);
 
 /// The value of a key that is there. @throws InputError naming the key if it is not of the type asked for
 std::string string_at(const Json& object, const char* key, const std::string& where);

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include "wienertree/cubature/formula_keys.hpp"
 #include "wienertree/cubature/json_fields.hpp"
 #include "wienertree/model/error.hpp"
 
@@ -11,12 +12,12 @@ namespace {
 using json::Json;
 
 LieElement element_from(const Json& object, const std::string& where) {
-  json::check_keys(object, {"weight", "terms"}, where);
+  json::check_keys(object, lie_element_keys, where);
   LieElement element;
   element.weight = json::number(object.at("weight"), "\"weight\"", where);
   for (const Json& term : json::array_at(object, "terms", where)) {
     const std::string here = fmt::format("{}, term {}", where, element.terms.size() + 1);
-    json::check_keys(term, {"bracket", "coefficient"}, here);
+    json::check_keys(term, lie_term_keys, here);
     element.terms.push_back({LieBracket::parse(json::string_at(term, "bracket", here), here),
                              json::number(term.at("coefficient"), "\"coefficient\"", here)});
   }
@@ -27,7 +28,7 @@ LieElement element_from(const Json& object, const std::string& where) {
 
 LieFormula parse_lie_formula(const std::string& text, const std::string& where) {
   const Json root = json::parse(text, where);
-  json::check_keys(root, {"kind", "name", "degree", "dimension", "source", "elements"}, where);
+  json::check_keys(root, lie_formula_keys, where);
   if (json::string_at(root, "kind", where) != "lie")
     throw InputError("\"kind\" must be \"lie\"", where, json::brief(root.at("kind")));
   LieFormula formula;

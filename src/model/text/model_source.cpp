@@ -5,6 +5,7 @@
 #include <algorithm>
 
 #include "wienertree/model/text/lexer.hpp"
+#include "wienertree/model/text/model_keys.hpp"
 #include "wienertree/model/text/toml_section.hpp"
 
 namespace wienertree::text {
@@ -40,7 +41,7 @@ std::vector<StateSource> read_states(const Section& section, const std::vector<N
     for (const NamedExpression& parameter : parameters)
       if (parameter.name == name)
         throw InputError("this name is already that of a parameter", state.location.text(), name);
-    entry.only({"initial", "lower", "upper", "boundary"});
+    entry.only(state_keys);
     if (entry.has("initial")) state.initial = entry.expression("initial");
     if (entry.has("lower")) state.lower = entry.expression("lower");
     if (entry.has("upper")) state.upper = entry.expression("upper");
@@ -83,7 +84,7 @@ void read_dynamics(const Section& root, ModelSource& model) {
 }
 
 NoiseSource read_noise(const Section& section) {
-  section.only({"law", "sd", "scale", "dof"});
+  section.only(noise_keys);
   std::vector<std::string> names;
   for (const NoiseLawName& known : noise_laws) names.emplace_back(known.law);
   const NoiseLawName& law = noise_laws.at(section.choice("law", names));
@@ -104,7 +105,7 @@ void forbid(const Section& section, std::initializer_list<const char*> keys, con
 }
 
 ObservationSource read_observation(const Section& section) {
-  section.only({"kind", "h", "noise", "timing", "log_likelihood"});
+  section.only(observation_keys);
   ObservationSource result;
   result.location = section.location();
   const bool continuous = section.choice("kind", {"continuous", "discrete"}) == 0;
@@ -138,7 +139,7 @@ void check_size(const std::vector<SourceExpression>& list, std::size_t d, const 
 }
 
 InitialSource read_initial(const Section& section, std::size_t d) {
-  section.only({"mean", "covariance"});
+  section.only(initial_keys);
   InitialSource result;
   result.location = section.location();
   if (section.has("mean")) {
@@ -155,7 +156,7 @@ InitialSource read_initial(const Section& section, std::size_t d) {
 }
 
 ExactClaim read_exact(const Section& section) {
-  section.only({"filter"});
+  section.only(exact_keys);
   constexpr std::array filters{ExactFilter::benes, ExactFilter::kalman_bucy, ExactFilter::kalman};
   return {filters.at(section.choice("filter", {"benes", "kalman-bucy", "kalman"})),
           section.location("filter")};
@@ -169,8 +170,7 @@ std::string stem(std::string file) {
 
 ModelSource read(const toml::table& table, const TomlFile& file) {
   const Section root(file, table, "");
-  root.only(
-      {"name", "convention", "parameters", "state", "drift", "diffusion", "observation", "initial", "exact"});
+  root.only(model_keys);
   ModelSource model;
   model.file = file.name;
   model.name = root.has("name") ? root.string("name") : stem(file.name);

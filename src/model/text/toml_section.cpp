@@ -79,8 +79,8 @@ std::vector<std::string> Section::keys() const {
   return result;
 }
 
-void Section::only(std::initializer_list<std::string_view> known) const {
-  const std::vector<std::string> names(known.begin(), known.end());
+void Section::only(std::span<const FileKey> known) const {
+  const std::vector<std::string> names = names_of(known);
   for (const auto& [key, value] : table_) {
     if (std::find(names.begin(), names.end(), key.str()) != names.end()) continue;
     Location place = locate(value, path_of(key.str()));

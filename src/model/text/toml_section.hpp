@@ -2,11 +2,12 @@
 /// A TOML table with errors that name file, line and key. The only header that shows toml++.
 #include <toml++/toml.h>
 #include <cstdint>
-#include <initializer_list>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
 
+#include "wienertree/model/file_key.hpp"
 #include "wienertree/model/text/location.hpp"
 
 namespace wienertree::text {
@@ -28,7 +29,7 @@ class Section {
       : file_(file), table_(table), path_(std::move(path)) {}
 
   /// @throws InputError for a key that is not `known`, suggesting the nearest
-  void only(std::initializer_list<std::string_view> known) const;
+  void only(std::span<const FileKey> known) const;
   bool has(std::string_view key) const { return table_.contains(key); }
   /// Keys in the order of the file.
   std::vector<std::string> keys() const;
