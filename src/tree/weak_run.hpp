@@ -14,7 +14,7 @@ struct WeakRun {
   double horizon = 1;                            ///< T
   std::size_t steps = 10;                        ///< n
   double gamma = 1;                              ///< of Kusuoka's grid
-  std::uint32_t launches = 1, first_launch = 0;  ///< launches first_launch, first_launch + 1, ..
+  std::uint32_t launches = 1, first_launch = 0;  ///< launches from first_launch on
   /// Also from ceil(n/2) steps, and the two extrapolated.
   bool richardson = false;
 };

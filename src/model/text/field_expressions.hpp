@@ -40,8 +40,8 @@ struct SymbolicModel {
   std::vector<Bracket> brackets;  ///< i < j, when asked for
 };
 
-/// `further` fields are brackets of pairs, V_{p+1} = [V_i, V_j] with (i, j) = further[0] and so on, of V_0
-/// .. V_p or further fields before it; `coefficients.p` counts them.
+/// `further` fields are brackets of pairs, V_{p+1} = [V_i, V_j] with (i, j) = further[0] and so on, of the
+/// model's fields or further ones before it; `coefficients.p` counts them.
 /// @throws InputError naming the place in the source
 SymbolicModel derive(const ModelSource& source, bool with_brackets,
                      const std::vector<std::pair<std::size_t, std::size_t>>& further = {});
