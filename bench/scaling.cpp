@@ -154,7 +154,8 @@ int main(int argc, char** argv) {
     const Cost c = filter_once({argv[1], static_cast<std::size_t>(std::atof(argv[2])),
                                 static_cast<std::size_t>(std::atoi(argv[3])),
                                 static_cast<unsigned>(std::atoi(argv[4]))});
-    fmt::print("{:.3g} s, {:.1f} ns a child\n", c.wall, 1e9 * c.processor / c.children);
+    fmt::print("{:.3g} s, {:.1f} ns a child, {:.1f} of a full step\n", c.wall, 1e9 * c.processor / c.children,
+               1e9 * c.full_processor / c.full_children);
     return 0;
   }
   const double most = argc > 1 ? std::atof(argv[1]) : 1e7;

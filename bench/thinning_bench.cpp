@@ -92,7 +92,7 @@ void order(benchmark::State& state, std::size_t d, bool sorted) {
   ParticleMasses masses;
   assign_masses(m.log_weight, m.parents, masses);
   SiteOrdering ordering;
-  std::vector<std::uint32_t> visit;
+  Buffer<std::uint32_t> visit;
   for (auto _ : state) ordering.spatial(m, masses, visit);
   per_item(state, m.size());
 }

@@ -4,13 +4,20 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdint>
 #include <limits>
 
 #include "wienertree/filter/places.hpp"
+#include "wienertree/tree/clones.hpp"
+#include "wienertree/tree/lane_sum.hpp"
 
 namespace wienertree {
 namespace {
+
+WIENERTREE_CLONES bool all_within(std::span<const double> x, double lower, double upper) {
+  const double* v = x.data();
+  const auto outside = [&](std::size_t n) { return (v[n] >= lower) & (v[n] <= upper) ? 0.0 : 1.0; };
+  return lane_sum(0, x.size(), outside) == 0.0;
+}
 
 void keep_component(const Model& model, const ObservationWindow& window, std::size_t i, std::size_t first,
                     std::span<double> x) {
@@ -20,9 +27,7 @@ void keep_component(const Model& model, const ObservationWindow& window, std::si
     for (double& v : x) v = v < b.lower ? b.lower : v > b.upper ? b.upper : v;  // NaN stays
   const double lower = std::max(b.lower, -largest), upper = std::min(b.upper, largest);
   const auto inside = [&](double v) { return (v >= lower) & (v <= upper); };
-  std::uint64_t outside = 0;
-  for (const double v : x) outside |= inside(v) ? 0 : 1;
-  if (outside == 0) return;
+  if (all_within(x, lower, upper)) return;
   const auto n = static_cast<std::size_t>(std::find_if_not(x.begin(), x.end(), inside) - x.begin());
   throw RunError(
       std::isfinite(x[n]) ? "a particle left the state's bounds" : "a particle's state is not finite",

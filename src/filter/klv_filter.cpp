@@ -14,11 +14,66 @@
 #include "wienertree/tree/tree_size.hpp"
 
 namespace wienertree {
-namespace {
 
-constexpr std::size_t block = 1024;  ///< nodes a task: their sensor values stay in cache
+// The likelihood of the window, given to every child while it is in cache.
+class KlvFilter::Weigher final : public FamilyVisitor {
+ public:
+  Weigher(KlvFilter& filter, const ObservationWindow& window)
+      : filter_(filter),
+        model_(filter.model_),
+        window_(window),
+        weight_(filter.likelihood_of(filter.children_)) {}
 
-}  // namespace
+  void parents(std::size_t first, std::size_t count, std::size_t thread) override {
+    if (model_.observation != ObservationKind::continuous) return;
+    const Functional& functional = *filter_.functional_;
+    const std::size_t k = model_.fields->sensor_dimension(), p = model_.noise_dimension();
+    Scratch& s = filter_.scratch_[thread];
+    s.sensor.reshape(k, count);
+    s.derivative.reshape(functional.uses_derivative() ? k * p : 0, count);
+    s.term.resize(count);
+    const ConstBatchView x = std::as_const(filter_.survivors_.states).view().nodes(first, count);
+    model_.fields->sensor(x, s.sensor);
+    if (functional.uses_derivative()) model_.fields->sensor_derivative(x, s.derivative);
+    functional.at_start(window_, s.sensor, s.derivative, s.term);
+  }
+
+  void children(std::size_t, std::size_t child, std::size_t count, std::size_t thread) override {
+    const std::span<double> w = std::span(weight_).subspan(child, count);
+    const ConstBatchView x = std::as_const(filter_.children_.states).view().nodes(child, count);
+    if (model_.observation == ObservationKind::continuous) weigh_continuous(x, w, filter_.scratch_[thread]);
+    if (model_.observation == ObservationKind::discrete) weigh_discrete(x, w, filter_.scratch_[thread]);
+    const LargestLogWeight largest = largest_log_weight(w);
+    if (!largest.all_valid) valid_.store(false, std::memory_order_relaxed);
+    if (largest.value > -std::numeric_limits<double>::infinity())
+      positive_.store(true, std::memory_order_relaxed);
+  }
+
+  /// Of all children that were visited: no weight is NaN or +infinity, and one is positive.
+  bool passed() const { return valid_ && positive_; }
+
+ private:
+  void weigh_continuous(ConstBatchView x, std::span<double> w, Scratch& s) const {
+    for (std::size_t n = 0; n < w.size(); ++n) w[n] += s.term[n];
+    if (!filter_.functional_->uses_end()) return;
+    s.end_sensor.reshape(s.sensor.components(), w.size());
+    model_.fields->sensor(x, s.end_sensor);
+    filter_.functional_->at_end(window_, s.sensor, s.derivative, s.end_sensor, w);
+  }
+
+  void weigh_discrete(ConstBatchView x, std::span<double> w, Scratch& s) const {
+    if (window_.at_start || window_.observation.empty()) return;
+    s.term.resize(w.size());
+    model_.density->log_density(window_.observation, x, s.term);
+    for (std::size_t n = 0; n < w.size(); ++n) w[n] += s.term[n];
+  }
+
+  KlvFilter& filter_;
+  const Model& model_;
+  const ObservationWindow& window_;
+  LogWeights& weight_;
+  std::atomic<bool> valid_ = true, positive_ = false;
+};
 
 KlvFilter::KlvFilter(const Model& model, const FilterOptions& options)
     : model_(model),
@@ -28,7 +83,7 @@ KlvFilter::KlvFilter(const Model& model, const FilterOptions& options)
       grower_(model_, options_.flow, options_.tolerance, options_.formula, options_.threads),
       survivors_(first_generation(model_, options_.nodes)),
       current_(&survivors_),
-      child_sensor_(options_.threads) {
+      scratch_(options_.threads) {
   if (carries_likelihood()) survivors_.log_likelihood.assign(survivors_.size(), 0.0);
 }
 
@@ -40,110 +95,55 @@ bool KlvFilter::carries_likelihood() const {
 }
 
 // The part of the weight that observations go to.
-std::vector<double>& KlvFilter::likelihood_of(Generation& g) const {
+KlvFilter::LogWeights& KlvFilter::likelihood_of(Generation& g) const {
   return carries_likelihood() ? g.log_likelihood : g.log_weight;
 }
 
 void KlvFilter::advance(const ObservationWindow& window) {
-  observe_start(window);
+  weigh_start(window);
   if (window.length() > 0) {
     grow(window);
-    weigh(window);
+    thin(window);
   }
-  check_weights(likelihood_of(window.length() > 0 ? children_ : survivors_), window);
-  if (window.length() > 0) thin(window);
   ++statistics_.steps;
   time_ = window.end;
   stale_ = true;
 }
 
-// Whatever depends on the nodes at the window's start: an observation there, and the functional's first term.
-void KlvFilter::observe_start(const ObservationWindow& window) {
-  const bool here = window.at_start || window.length() == 0;
-  if (model_.observation == ObservationKind::discrete && here && !window.observation.empty()) {
+// An observation at the window's start.
+void KlvFilter::weigh_start(const ObservationWindow& window) {
+  if (window.length() > 0 && !window.at_start) return;
+  LogWeights& weight = likelihood_of(survivors_);
+  if (model_.observation == ObservationKind::discrete && !window.observation.empty()) {
     start_term_.resize(survivors_.size());
     model_.density->log_density(window.observation, survivors_.states, start_term_);
-    std::vector<double>& weight = likelihood_of(survivors_);
     for (std::size_t n = 0; n < survivors_.size(); ++n) weight[n] += start_term_[n];
     current_ = &survivors_;
   }
-  if (model_.observation != ObservationKind::continuous) return;
-  const std::size_t k = model_.fields->sensor_dimension(), p = model_.noise_dimension();
-  sensor_.reshape(k, survivors_.size());
-  derivative_.reshape(functional_->uses_derivative() ? k * p : 0, survivors_.size());
-  start_term_.resize(survivors_.size());
-  for_blocks(
-      &grower_.threads(), survivors_.size(), block, [&](std::size_t first, std::size_t count, std::size_t) {
-        const ConstBatchView x = std::as_const(survivors_.states).view().nodes(first, count);
-        const BatchView h0 = sensor_.view().nodes(first, count), G = derivative_.view().nodes(first, count);
-        model_.fields->sensor(x, h0);
-        if (functional_->uses_derivative()) model_.fields->sensor_derivative(x, G);
-        functional_->at_start(window, h0, G, std::span(start_term_).subspan(first, count));
-      });
+  if (!(window.length() > 0)) check_log_weights(weight, window);
 }
 
 void KlvFilter::grow(const ObservationWindow& window) {
-  grower_.grow(survivors_, window.length(), children_, failures_);
+  Weigher weigher(*this, window);
+  grower_.grow(survivors_, window.length(), children_, failures_, &weigher);
   children_.time = window.end;
   current_ = &children_;
   statistics_.children += children_.size();
   statistics_.flow = flow_before_;
   statistics_.flow += grower_.statistics();
-  if (!failures_.empty()) handle_failures(window);
+  const bool intact = failures_.empty();
+  if (!intact) handle_failures(window);
+  if (!intact || !weigher.passed()) check_log_weights(likelihood_of(children_), window);
 }
 
 void KlvFilter::handle_failures(const ObservationWindow& window) {
   // Where every node fails, none is left to stand for those that are dropped.
   if (options_.on_node_failure == OnNodeFailure::stop || failures_.size() == children_.size())
     throw_node_failure(failures_, model_, place(window));
-  for (const NodeFailure& f : failures_) {
-    // A dropped node has no mass; its state is its parent's, so that nothing downstream meets a NaN.
+  for (const NodeFailure& f : failures_)
     children_.log_weight[f.node] = -std::numeric_limits<double>::infinity();
-    for (std::size_t i = 0; i < children_.states.components(); ++i)
-      children_.states(i, f.node) = survivors_.states(i, children_.parent[f.node]);
-  }
   statistics_.dropped_nodes += failures_.size();
   failures_.clear();
-}
-
-void KlvFilter::weigh(const ObservationWindow& window) {
-  const std::size_t parents = survivors_.size();
-  std::vector<double>& weight = likelihood_of(children_);
-  if (model_.observation == ObservationKind::discrete) {
-    if (window.at_start || window.observation.empty()) return;
-    term_.resize(children_.size());
-    model_.density->log_density(window.observation, children_.states, term_);
-    for (std::size_t n = 0; n < children_.size(); ++n) weight[n] += term_[n];
-    return;
-  }
-  if (model_.observation == ObservationKind::none) return;
-  // Tasks are blocks of one branch each.
-  const std::size_t blocks = (parents + block - 1) / block;
-  for (Batch& scratch : child_sensor_) scratch.reshape(sensor_.components(), std::min(block, parents));
-  grower_.threads().for_each(options_.formula.paths.size() * blocks, [&](std::size_t task,
-                                                                         std::size_t thread) {
-    const std::size_t first = task % blocks * block, count = std::min(block, parents - first);
-    const std::size_t child = task / blocks * parents + first;
-    const std::span<double> w = {weight.data() + child, count};
-    for (std::size_t n = 0; n < count; ++n) w[n] += start_term_[first + n];
-    if (!functional_->uses_end()) return;
-    const BatchView h1 = child_sensor_[thread].view().nodes(0, count);
-    model_.fields->sensor(children_.states.view().nodes(child, count), h1);
-    const BatchView G = functional_->uses_derivative() ? derivative_.view().nodes(first, count) : BatchView{};
-    functional_->at_end(window, sensor_.view().nodes(first, count), G, h1, w);
-  });
-}
-
-// As check_log_weights, which is asked only where something is wrong.
-void KlvFilter::check_weights(std::span<const double> log_weight, const ObservationWindow& window) {
-  std::atomic<bool> valid = true, positive = false;
-  for_blocks(&grower_.threads(), log_weight.size(), 16 * block,
-             [&](std::size_t first, std::size_t count, std::size_t) {
-               const auto [largest, all_valid] = largest_log_weight(log_weight.subspan(first, count));
-               if (!all_valid) valid = false;
-               if (largest > -std::numeric_limits<double>::infinity()) positive = true;
-             });
-  if (!valid || !positive) check_log_weights(log_weight, window);
 }
 
 void KlvFilter::thin(const ObservationWindow& window) {
@@ -168,7 +168,7 @@ void KlvFilter::thin(const ObservationWindow& window) {
 // (sum q L)^2 / (sum q sum q L^2).
 void KlvFilter::let_likelihoods_decide_if_due() {
   if (!carries_likelihood() || options_.prune_weights == PruneWeights::cubature) return;
-  std::vector<double>&q = children_.log_weight, &L = children_.log_likelihood;
+  LogWeights &q = children_.log_weight, &L = children_.log_likelihood;
   const double largest_q = *std::max_element(q.begin(), q.end());
   const double largest_L = *std::max_element(L.begin(), L.end());
   double mass = 0, sum = 0, squares = 0;

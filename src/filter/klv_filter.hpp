@@ -20,15 +20,21 @@ class KlvFilter final : public Filter {
 
  private:
   void exchange_state(StateArchive& archive) override;
-  void observe_start(const ObservationWindow& window);
+  using LogWeights = decltype(Generation::log_weight);
+  class Weigher;
+  /// What a thread needs for one block of parents and its children.
+  struct Scratch {
+    Batch sensor, derivative, end_sensor;
+    std::vector<double> term;
+  };
+
+  void weigh_start(const ObservationWindow& window);
   void grow(const ObservationWindow& window);
-  void weigh(const ObservationWindow& window);
-  void check_weights(std::span<const double> log_weight, const ObservationWindow& window);
   void thin(const ObservationWindow& window);
   void let_likelihoods_decide_if_due();
   void handle_failures(const ObservationWindow& window);
   bool carries_likelihood() const;
-  std::vector<double>& likelihood_of(Generation& generation) const;
+  LogWeights& likelihood_of(Generation& generation) const;
 
   Model model_;
   FilterOptions options_;
@@ -39,9 +45,8 @@ class KlvFilter final : public Filter {
   const Generation*
       current_;  ///< what the posterior is made of: children_, or survivors_ where they are the same
   Selection selection_;
-  Batch sensor_, derivative_;
-  std::vector<Batch> child_sensor_;  ///< scratch, one a thread
-  std::vector<double> start_term_, term_;
+  std::vector<Scratch> scratch_;  ///< one a thread
+  std::vector<double> start_term_;
   std::vector<NodeFailure> failures_;
   FlowStatistics flow_before_;  ///< work of the filter whose state was read
   double time_ = 0;

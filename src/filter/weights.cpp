@@ -29,16 +29,17 @@ constexpr double infinity = std::numeric_limits<double>::infinity();
 }  // namespace
 
 void check_log_weights(std::span<const double> log_weight, const ObservationWindow& window) {
-  const auto [largest, all_valid] = largest_log_weight(log_weight);
-  if (!all_valid || largest == -infinity) refuse(log_weight, place_and_observation(window));
+  const LargestLogWeight largest = largest_log_weight(log_weight);
+  if (!largest.all_valid || largest.value == -infinity) refuse(log_weight, place_and_observation(window));
 }
 
 void NormalisedWeights::assign(std::span<const double> a, std::span<const double> b, std::size_t step,
                                double time) {
   weight.assign(a.begin(), a.end());
   for (std::size_t n = 0; n < b.size(); ++n) weight[n] += b[n];
-  const auto [largest, all_valid] = largest_log_weight(weight);
-  if (!all_valid || largest == -infinity) refuse(weight, fmt::format("step {}, t = {:g}", step, time));
+  const LargestLogWeight found = largest_log_weight(weight);
+  const double largest = found.value;
+  if (!found.all_valid || largest == -infinity) refuse(weight, fmt::format("step {}, t = {:g}", step, time));
   const double sum = relative_weights(weight, largest, weight.data());
   const double squares = sum_of_squares(weight);
   for (double& w : weight) w /= sum;

@@ -7,7 +7,8 @@
 #include <new>
 #include <span>
 #include <type_traits>
-#include <vector>
+
+#include "wienertree/model/buffer.hpp"
 
 namespace wienertree {
 
@@ -66,7 +67,7 @@ class Batch {
   void reshape(std::size_t components, std::size_t nodes) {
     components_ = components;
     nodes_ = nodes;
-    if (values_.size() < components * nodes) values_.resize(components * nodes);
+    if (values_.size() < components * nodes) resize_unspecified(values_, components * nodes);
   }
   std::size_t components() const { return components_; }
   std::size_t nodes() const { return nodes_; }
@@ -85,7 +86,7 @@ class Batch {
   }
 
  private:
-  std::vector<double> values_;
+  Buffer<double> values_;
   std::size_t components_ = 0, nodes_ = 0;
 };
 

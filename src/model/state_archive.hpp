@@ -89,8 +89,8 @@ class StateArchive {
       exchange(*this, value);
     }
   }
-  template <class T>
-  void pass(std::vector<T>& values) {
+  template <class T, class Allocator>
+  void pass(std::vector<T, Allocator>& values) {
     values.resize(pass_count(values.size(), is_plain<T> ? sizeof(T) : 1));
     if constexpr (is_plain<T>) {
       pass_bytes(values.data(), values.size() * sizeof(T));

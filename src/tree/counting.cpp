@@ -22,7 +22,7 @@ void check_shapes(const Sites& sites) {
 }
 
 void put_in_order(SiteOrder order, SiteOrdering& ordering, const Sites& sites, const ParticleMasses& masses,
-                  std::vector<std::uint32_t>& visit) {
+                  Buffer<std::uint32_t>& visit) {
   if (order == SiteOrder::spatial)
     ordering.spatial(sites, masses, visit);
   else
@@ -129,7 +129,8 @@ void CountingThinning::collect(SiteAt site_at, ThreadPool* threads, Selection& o
 void KeepAll::thin(const Sites& sites, std::size_t, const RandomStream&, Selection& out) {
   check_shapes(sites);
   assign_masses(sites.log_weight, 1, masses_, sites.threads);
-  put_in_order(order_, ordering_, sites, masses_, out.site);
+  put_in_order(order_, ordering_, sites, masses_, visit_);
+  out.site.assign(visit_.begin(), visit_.end());
   out.count.clear();
   out.log_weight.resize(out.site.size());
   for (std::size_t k = 0; k < out.site.size(); ++k) out.log_weight[k] = sites.log_weight[out.site[k]];

@@ -30,7 +30,7 @@ class CountingThinning final : public Thinning {
   SiteOrder order_;
   SiteOrdering ordering_;
   ParticleMasses masses_;
-  std::vector<std::uint32_t> visit_;
+  Buffer<std::uint32_t> visit_;
   Buffer<std::uint32_t> count_;
   std::vector<std::size_t> kept_before_;  ///< each block of sites
   std::vector<double> log_small_;         ///< log o for small o > 0
@@ -48,6 +48,7 @@ class KeepAll final : public Thinning {
   SiteOrder order_;
   SiteOrdering ordering_;
   ParticleMasses masses_;
+  Buffer<std::uint32_t> visit_;
 };
 
 }  // namespace wienertree

@@ -67,9 +67,9 @@ class Genealogy {
   struct Level {
     double time = 0;
     std::size_t size = 0, before = 0;
-    std::vector<std::uint32_t> parent, count;
-    std::vector<std::uint16_t> branch;
-    std::vector<double> log_weight, log_likelihood;
+    Buffer<std::uint32_t> parent, count;
+    Buffer<std::uint16_t> branch;
+    Buffer<double> log_weight, log_likelihood;
     Batch states;
   };
   KeptAttributes kept_;

@@ -1,7 +1,6 @@
 #pragma once
 /// One generation of the tree: a weighted measure on nodes at one time, as a structure of arrays.
 #include <cstdint>
-#include <vector>
 
 #include "wienertree/model/batch.hpp"
 #include "wienertree/model/state_archive.hpp"
@@ -12,12 +11,12 @@ namespace wienertree {
 /// evidence so far.
 struct Generation {
   double time = 0;
-  Batch states;                        ///< d x N
-  std::vector<double> log_weight;      ///< N: the part of the weight that thinning sees
-  std::vector<double> log_likelihood;  ///< N, or empty for all zero: the part that is only carried
-  std::vector<std::uint32_t> parent;   ///< N: index in the generation before; empty at the root
-  std::vector<std::uint16_t> branch;   ///< N: which path of the formula; empty at the root
-  std::vector<std::uint32_t> count;  ///< N: particles at each node when thinning counts them; empty otherwise
+  Batch states;                   ///< d x N
+  Buffer<double> log_weight;      ///< N: the part of the weight that thinning sees
+  Buffer<double> log_likelihood;  ///< N, or empty for all zero: the part that is only carried
+  Buffer<std::uint32_t> parent;   ///< N: index in the generation before; empty at the root
+  Buffer<std::uint16_t> branch;   ///< N: which path of the formula; empty at the root
+  Buffer<std::uint32_t> count;    ///< N: particles at each node when thinning counts them; empty otherwise
 
   std::size_t size() const { return states.nodes(); }
   void exchange(StateArchive& archive) {

@@ -8,14 +8,22 @@
 #include <limits>
 #include <mutex>
 
+#include "wienertree/model/buffer.hpp"
 #include "wienertree/model/error.hpp"
-#include "wienertree/tree/buffer.hpp"
 
 namespace wienertree {
 namespace {
 
 constexpr std::size_t nodes_a_task = 16 * flow_block;
 constexpr std::size_t most_branches = std::size_t{1} << 16;
+
+// Parents whose families are grown in one task: few enough that they stay in cache with their children, and
+// that there are tasks for many threads; and a number that does not depend on the threads.
+std::size_t families_a_task(std::size_t parents, std::size_t branches) {
+  const std::size_t least = std::max<std::size_t>(1, 12 / branches);
+  const std::size_t most = std::max<std::size_t>(1, 192 / branches);
+  return std::clamp(parents / (16 * flow_block), least, most) * flow_block;
+}
 
 void shape_children(const Generation& parents, const CubatureFormula& formula, double s,
                     Generation& children) {
@@ -62,7 +70,7 @@ void gather(std::span<const T> from, std::span<const std::uint32_t> site, std::s
 }
 
 template <class T>
-void copy_column(std::span<const T> from, std::vector<T>& to, ThreadPool* threads) {
+void copy_column(const std::vector<T>& from, Buffer<T>& to, ThreadPool* threads) {
   resize_unspecified(to, from.size());
   for_blocks(threads, from.size(), nodes_a_task, [&](std::size_t first, std::size_t count, std::size_t) {
     std::copy_n(from.begin() + static_cast<std::ptrdiff_t>(first), count,
@@ -71,8 +79,7 @@ void copy_column(std::span<const T> from, std::vector<T>& to, ThreadPool* thread
 }
 
 template <class T>
-void gather(const std::vector<T>& from, std::span<const std::uint32_t> site, std::vector<T>& to,
-            ThreadPool* threads) {
+void gather(const Buffer<T>& from, std::span<const std::uint32_t> site, Buffer<T>& to, ThreadPool* threads) {
   resize_unspecified(to, from.empty() ? 0 : site.size());
   if (!from.empty()) gather(std::span<const T>(from), site, std::span<T>(to), threads);
 }
@@ -166,23 +173,35 @@ void grow_chosen(const Generation& parents, const CubatureFormula& formula, doub
 
 void grow(const Generation& parents, const CubatureFormula& formula, double s,
           std::span<const std::unique_ptr<Flow>> flows, ThreadPool& threads, Generation& children,
-          std::vector<NodeFailure>& failures) {
+          std::vector<NodeFailure>& failures, FamilyVisitor* visitor) {
   require_flows(flows, threads);
   shape_children(parents, formula, s, children);
   failures.clear();
-  const std::size_t nodes = parents.size(), tasks_a_branch = (nodes + nodes_a_task - 1) / nodes_a_task;
   std::mutex failures_mutex;
-  threads.for_each(formula.paths.size() * tasks_a_branch, [&](std::size_t task, std::size_t thread) {
-    const std::size_t branch = task / tasks_a_branch, first = task % tasks_a_branch * nodes_a_task;
-    const std::size_t count = std::min(nodes_a_task, nodes - first), at = branch * nodes + first;
+  const auto grow_branch = [&](std::size_t branch, std::size_t first, std::size_t count, std::size_t thread) {
     const CubaturePath& path = formula.paths[branch];
+    const std::size_t at = branch * parents.size() + first;
     plant(parents, branch, std::log(path.weight), first, count, children);
     std::vector<NodeFailure> failed;
     flows[thread]->move_along(path, s, children.states.view().nodes(at, count), failed);
     if (failed.empty()) return;
-    for (NodeFailure& f : failed) f.node += at;
+    for (NodeFailure& f : failed) {
+      for (std::size_t i = 0; i < parents.states.components(); ++i)
+        children.states(i, at + f.node) = parents.states(i, first + f.node);
+      f.node += at;
+    }
     const std::lock_guard lock(failures_mutex);
     failures.insert(failures.end(), failed.begin(), failed.end());
+  };
+  const std::size_t branches = formula.paths.size();
+  const std::size_t nodes = parents.size(), block = families_a_task(nodes, branches);
+  threads.for_each((nodes + block - 1) / block, [&](std::size_t task, std::size_t thread) {
+    const std::size_t first = task * block, count = std::min(block, nodes - first);
+    if (visitor != nullptr) visitor->parents(first, count, thread);
+    for (std::size_t branch = 0; branch < branches; ++branch) {
+      grow_branch(branch, first, count, thread);
+      if (visitor != nullptr) visitor->children(first, branch * nodes + first, count, thread);
+    }
   });
   sort_by_node(failures);
 }
@@ -223,8 +242,8 @@ void select(const Generation& children, const Selection& selection, Generation& 
     for (std::size_t i = 0; i < d; ++i)
       gather(children.states.component(i), site, survivors.states.component(i), threads);
   }
-  copy_column<double>(selection.log_weight, survivors.log_weight, threads);
-  copy_column<std::uint32_t>(selection.count, survivors.count, threads);
+  copy_column(selection.log_weight, survivors.log_weight, threads);
+  copy_column(selection.count, survivors.count, threads);
   gather(children.log_likelihood, site, survivors.log_likelihood, threads);
   gather(children.parent, site, survivors.parent, threads);
   gather(children.branch, site, survivors.branch, threads);

@@ -13,18 +13,31 @@
 
 namespace wienertree {
 
+/// What else is to be done with nodes while they are in cache: called from the threads that grow them.
+class FamilyVisitor {
+ public:
+  virtual ~FamilyVisitor() = default;
+  /// Parents first..first+count-1, before their children are grown.
+  virtual void parents(std::size_t first, std::size_t count, std::size_t thread) = 0;
+  /// Their children along one path, nodes child..child+count-1, once they have been moved; in the thread that
+  /// visited the parents last.
+  virtual void children(std::size_t first_parent, std::size_t child, std::size_t count,
+                        std::size_t thread) = 0;
+};
+
 /// KLV_m(mu, s) = sum_i sum_j mu_i lambda_j delta_{flow_j(x_i)}, branch-major: the child of parent i along
 /// path j is node j * parents + i, at time parents.time + s, with log-weight log mu_i + log lambda_j, its
 /// parent's log-likelihood if there are any, and no count. The same bytes for any number of threads: nodes
 /// are handed out in blocks that do not depend on it. Buffers of `children` are reused.
 /// @param flows one a thread of the pool at least
-/// @param failures becomes the nodes that could not be moved, by ascending child index, each once. They keep
-/// their weight: what they mean is the caller's to decide.
+/// @param failures becomes the nodes that could not be moved, by ascending child index, each once. They have
+/// their weight, and stand where their parent does: what they mean is the caller's to decide.
+/// @param visitor if any, sees every parent and child
 /// @throws InputError if the formula has no path or more than 2^16, there are fewer flows than threads, or
 /// more than 2^32 - 1 children; what a flow throws
 void grow(const Generation& parents, const CubatureFormula& formula, double s,
           std::span<const std::unique_ptr<Flow>> flows, ThreadPool& threads, Generation& children,
-          std::vector<NodeFailure>& failures);
+          std::vector<NodeFailure>& failures, FamilyVisitor* visitor = nullptr);
 
 /// Only the children named by `chosen` (indices as above, in any order, each once), with the log-weights and
 /// counts of the selection: a thinning that does not look at states spares the others their ODEs. Children
@@ -43,8 +56,9 @@ class TreeGrower {
   /// With flows of the caller's: clones of `flow`, one a thread.
   TreeGrower(std::unique_ptr<Flow> flow, CubatureFormula formula, std::size_t threads);
 
-  void grow(const Generation& parents, double s, Generation& children, std::vector<NodeFailure>& failures) {
-    wienertree::grow(parents, formula_, s, flows_, threads_, children, failures);
+  void grow(const Generation& parents, double s, Generation& children, std::vector<NodeFailure>& failures,
+            FamilyVisitor* visitor = nullptr) {
+    wienertree::grow(parents, formula_, s, flows_, threads_, children, failures, visitor);
   }
   void grow_chosen(const Generation& parents, double s, const Selection& chosen, Generation& children,
                    std::vector<NodeFailure>& failures) {

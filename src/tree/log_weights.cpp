@@ -1,10 +1,8 @@
 #include "wienertree/tree/log_weights.hpp"
 
 #include <algorithm>
-#include <array>
-#include <cstdint>
+#include <cstring>
 #include <limits>
-#include <numeric>
 
 #include "wienertree/tree/clones.hpp"
 #include "wienertree/tree/elementary.hpp"
@@ -15,19 +13,29 @@ namespace wienertree {
 WIENERTREE_CLONES LargestLogWeight largest_log_weight(std::span<const double> log_weight) {
   const double* a = log_weight.data();
   const std::size_t n = log_weight.size();
-  std::array<double, sum_lanes> largest;
-  std::array<std::uint64_t, sum_lanes> invalid{};
-  largest.fill(-std::numeric_limits<double>::infinity());
-  const auto visit = [&](std::size_t l, double x) {
-    largest[l] = x > largest[l] ? x : largest[l];
-    invalid[l] |= x <= std::numeric_limits<double>::max() ? 0 : 1;
-  };
+  constexpr double most = std::numeric_limits<double>::max();
+  SumLanes largest = SumLanes{} - std::numeric_limits<double>::infinity(), x;
+  auto valid = largest <= most, positive = valid;
   std::size_t i = 0;
-  for (; i + sum_lanes <= n; i += sum_lanes)
-    for (std::size_t l = 0; l < sum_lanes; ++l) visit(l, a[i + l]);
-  for (; i < n; ++i) visit(0, a[i]);
-  return {*std::max_element(largest.begin(), largest.end()),
-          std::accumulate(invalid.begin(), invalid.end(), std::uint64_t{0}) == 0};
+  for (; i + sum_lanes <= n; i += sum_lanes) {
+    std::memcpy(&x, a + i, sizeof x);
+    largest = x > largest ? x : largest;
+    valid &= x <= most;
+    positive &= x >= -most;
+  }
+  LargestLogWeight all{-std::numeric_limits<double>::infinity(), true, true};
+  for (std::size_t l = 0; l < sum_lanes; ++l) {
+    all.value = std::max(all.value, largest[l]);
+    all.all_valid &= valid[l] != 0;
+    all.all_positive &= positive[l] != 0;
+  }
+  for (; i < n; ++i) {
+    all.value = a[i] > all.value ? a[i] : all.value;
+    all.all_valid &= a[i] <= most;
+    all.all_positive &= a[i] >= -most;
+  }
+  all.all_positive &= all.all_valid;
+  return all;
 }
 
 WIENERTREE_CLONES double relative_weights(std::span<const double> log_weight, double largest, double* w) {

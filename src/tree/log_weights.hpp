@@ -6,8 +6,9 @@
 namespace wienertree {
 
 struct LargestLogWeight {
-  double value;    ///< -infinity if there is none above
-  bool all_valid;  ///< no NaN, no +infinity
+  double value;       ///< -infinity if there is none above
+  bool all_valid;     ///< no NaN, no +infinity
+  bool all_positive;  ///< nor -infinity
 };
 
 LargestLogWeight largest_log_weight(std::span<const double> log_weight);

@@ -12,6 +12,7 @@
 #include <limits>
 
 #include "wienertree/model/error.hpp"
+#include "wienertree/tree/clones.hpp"
 #include "wienertree/tree/log_weights.hpp"
 
 namespace wienertree {
@@ -34,6 +35,17 @@ class CompensatedSum {
  private:
   double sum_ = 0, error_ = 0;
 };
+
+// From weights, as bits, to masses: rounded to nearest, and their sum.
+WIENERTREE_CLONES std::uint64_t scale_masses(std::uint64_t* mass, std::size_t n, double scale) {
+  std::uint64_t sum = 0;
+  for (std::size_t i = 0; i < n; ++i) {
+    mass[i] =
+        static_cast<std::uint64_t>(static_cast<std::int64_t>(std::bit_cast<double>(mass[i]) * scale + 0.5));
+    sum += mass[i];
+  }
+  return sum;
+}
 
 [[noreturn]] void refuse(std::span<const double> log_weight) {
   const std::string sites = fmt::format("{} sites", log_weight.size());
@@ -58,10 +70,13 @@ void assign_masses(std::span<const double> log_weight, std::uint64_t particles, 
     throw InputError("too many sites for 32-bit indices", "thinning", fmt::format("{}", n));
   std::vector<double>& scratch = out.scratch;
   scratch.assign((n + block - 1) / block, -infinity);
+  std::atomic<bool> all_positive = true;
   for_blocks(threads, n, block, [&](std::size_t first, std::size_t count, std::size_t b) {
-    const auto [value, all_valid] = largest_log_weight(log_weight.subspan(first, count));
-    scratch[b] = all_valid ? value : infinity;
+    const LargestLogWeight here = largest_log_weight(log_weight.subspan(first, count));
+    scratch[b] = here.all_valid ? here.value : infinity;
+    if (!here.all_positive) all_positive = false;
   });
+  out.all_positive = all_positive;
   const auto heaviest_block = std::max_element(scratch.begin(), scratch.end());
   const auto heaviest_from =
       log_weight.begin() + static_cast<std::ptrdiff_t>(block) * (heaviest_block - scratch.begin());
@@ -92,13 +107,9 @@ void assign_masses(std::span<const double> log_weight, std::uint64_t particles, 
   for_blocks(threads, n, block, [&](std::size_t first, std::size_t count, std::size_t) {
     std::uint64_t here = 0;
     for (std::size_t i = first; i < first + count; i += chunk) {
-      std::uint64_t sum_here = 0;
-      for (std::uint64_t& m : std::span(out.mass).subspan(i, std::min(chunk, first + count - i))) {
-        m = static_cast<std::uint64_t>(static_cast<std::int64_t>(std::bit_cast<double>(m) * scale + 0.5));
-        sum_here += m;
-      }
-      out.chunk_mass[i / chunk] = sum_here;
-      here += sum_here;
+      out.chunk_mass[i / chunk] =
+          scale_masses(out.mass.data() + i, std::min(chunk, first + count - i), scale);
+      here += out.chunk_mass[i / chunk];
     }
     assigned += here;
   });

@@ -8,7 +8,7 @@
 #include <span>
 #include <vector>
 
-#include "wienertree/tree/buffer.hpp"
+#include "wienertree/model/buffer.hpp"
 #include "wienertree/tree/parallel.hpp"
 
 namespace wienertree {
@@ -19,6 +19,7 @@ struct ParticleMasses {
   std::vector<std::uint64_t> chunk_mass;  ///< sums over `chunk` sites each, the last over what remains
   std::uint64_t particles = 0;            ///< N
   int fraction_bits = 0;                  ///< B = 63 - bits of N, so that 2^62 <= N 2^B < 2^63
+  bool all_positive = false;              ///< no log-weight is -infinity
   double log_total = 0;                   ///< log sum_i exp(log_weight_i)
   std::vector<double> scratch;
 };

@@ -1,7 +1,7 @@
 #pragma once
 /// Blocks of Philox4x32-10 (Salmon, Moraes, Dror, Shaw 2011, "Parallel random numbers: as easy as 1, 2, 3",
-/// SC11), the bijection of Random123's `philox.h`, four counters to a vector register where the processor
-/// has AVX2.
+/// SC11), the bijection of Random123's `philox.h`, four or eight counters to a vector register where the
+/// processor has AVX2 or AVX-512.
 #include <array>
 #include <cstddef>
 #include <cstdint>
@@ -9,7 +9,7 @@
 
 namespace wienertree {
 
-inline constexpr std::size_t philox_block = 16;
+inline constexpr std::size_t philox_block = 32;
 
 /// What a stream fixes: the key and three of the counter's words. Counter number c is
 /// (low word of c, high word of c XOR tag, step, launch).
@@ -21,7 +21,7 @@ struct PhiloxStream {
 /// The outputs of counters first .. first + philox_block - 1, two 64-bit words a counter: word (r_1, r_0) in
 /// `low[c]` and (r_3, r_2) in `high[c]`, where (a, b) = 2^32 a + b.
 struct PhiloxBlock {
-  alignas(32) std::array<std::uint64_t, philox_block> low, high;
+  alignas(64) std::array<std::uint64_t, philox_block> low, high;
 };
 
 void philox(const PhiloxStream& stream, std::uint64_t first, PhiloxBlock& out);

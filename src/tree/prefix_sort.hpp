@@ -6,7 +6,7 @@
 #include <cstdint>
 #include <span>
 
-#include "wienertree/tree/buffer.hpp"
+#include "wienertree/model/buffer.hpp"
 #include "wienertree/tree/parallel.hpp"
 
 namespace wienertree {

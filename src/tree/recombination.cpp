@@ -160,7 +160,7 @@ void Recombination::thin_line(const Sites& sites, std::size_t budget, Selection&
   out.discarded = nodes_.discarded;
 }
 
-void Recombination::thin_space(const Sites&, std::size_t budget, Selection& out) {
+void Recombination::thin_space(const Sites& sites, std::size_t budget, Selection& out) {
   const std::size_t d = varying_.size();
   // (d + r choose r) > r: a degree beyond the budget is lowered anyhow.
   const auto largest_useful =
@@ -170,7 +170,7 @@ void Recombination::thin_space(const Sites&, std::size_t budget, Selection& out)
   if (degree == 0 && !patched_) degree = largest_useful;
   while (moment_number(d, degree, budget + 1) > budget) --degree;
   if (!patched_) budget = moment_number(d, degree, budget);
-  space_.reduce(x_, log_weight_, degree, budget, kept_);
+  space_.reduce(x_, log_weight_, degree, budget, sites.threads, kept_);
   out.site.resize(kept_.point.size());
   for (std::size_t j = 0; j < kept_.point.size(); ++j) out.site[j] = live_[kept_.point[j]];
   out.log_weight.assign(kept_.log_weight.begin(), kept_.log_weight.end());

@@ -27,6 +27,7 @@ class SpacePartition {
   void reset(std::size_t dimension, std::size_t points);
   std::size_t dimension() const { return dimension_; }
   std::span<double> component(std::size_t i) { return {z_.data() + i * points_, points_}; }
+  std::span<const double> component(std::size_t i) const { return {z_.data() + i * points_, points_}; }
   std::span<double> weight() { return {weight_.data(), points_}; }
 
   /// Scales every component by its weighted standard deviation (units must not matter), and cuts.

@@ -12,37 +12,73 @@
 namespace wienertree::recombination {
 
 void SpaceRecombination::reduce(ConstBatchView x, std::span<const double> log_weight, int degree,
-                                std::size_t budget, KeptPoints& out) {
-  out.point.clear();
-  out.log_weight.clear();
-  out.discarded = 0;
+                                std::size_t budget, ThreadPool* threads, KeptPoints& out) {
   const double largest = *std::max_element(log_weight.begin(), log_weight.end());
   partition_.reset(x.components(), x.nodes());
   for (std::size_t i = 0; i < x.components(); ++i)
     std::copy(x.component(i).begin(), x.component(i).end(), partition_.component(i).begin());
   const double total = relative_weights(log_weight, largest, partition_.weight().data());
-  partition_.cut(degree, moment_number(x.components(), degree, budget), budget);
-  for (const Patch& patch : partition_.patches()) reduce_patch(patch, log_weight, degree, largest, out);
+  const std::size_t most = moment_number(x.components(), degree, budget);
+  partition_.cut(degree, most, budget);
+
+  const std::span<const Patch> patches = partition_.patches();
+  std::size_t room = 0;
+  first_.clear();
+  for (const Patch& patch : patches) {
+    first_.push_back(room);
+    room += std::min(patch.size(), most);
+  }
+  out.point.resize(room);
+  out.log_weight.resize(room);
+  result_.resize(patches.size());
+  const std::size_t workers = threads == nullptr ? 1 : threads->size();
+  if (reduction_.size() < workers) reduction_.resize(workers);
+  const auto reduce_patch = [&](std::size_t k, std::size_t thread) {
+    const std::size_t some = std::min(patches[k].size(), most);
+    const PatchRoom room_of_patch{std::span(out.point).subspan(first_[k], some),
+                                  std::span(out.log_weight).subspan(first_[k], some)};
+    result_[k] =
+        reduction_[thread].reduce(partition_, patches[k], log_weight, degree, largest, room_of_patch);
+  };
+  if (threads != nullptr)
+    threads->for_each(patches.size(), reduce_patch);
+  else
+    for (std::size_t k = 0; k < patches.size(); ++k) reduce_patch(k, 0);
+
+  // Together, in the patches' order.
+  std::size_t kept = 0;
+  out.discarded = 0;
+  for (std::size_t k = 0; k < patches.size(); ++k) {
+    std::copy_n(out.point.begin() + static_cast<std::ptrdiff_t>(first_[k]), result_[k].kept,
+                out.point.begin() + static_cast<std::ptrdiff_t>(kept));
+    std::copy_n(out.log_weight.begin() + static_cast<std::ptrdiff_t>(first_[k]), result_[k].kept,
+                out.log_weight.begin() + static_cast<std::ptrdiff_t>(kept));
+    kept += result_[k].kept;
+    out.discarded += result_[k].discarded;
+  }
+  out.point.resize(kept);
+  out.log_weight.resize(kept);
   out.discarded /= total;
 }
 
-void SpaceRecombination::reduce_patch(const Patch& patch, std::span<const double> log_weight, int degree,
-                                      double largest, KeptPoints& out) {
-  const auto order = partition_.order().subspan(patch.begin, patch.size());
-  const std::size_t d = partition_.dimension(), q = moment_number(d, degree, patch.size());
+PatchReduction::Result PatchReduction::reduce(const SpacePartition& partition, const Patch& patch,
+                                              std::span<const double> log_weight, int degree, double largest,
+                                              PatchRoom out) {
+  const auto order = partition.order().subspan(patch.begin, patch.size());
+  const std::size_t d = partition.dimension(), q = moment_number(d, degree, patch.size());
   if (patch.size() <= q) {
-    for (const std::uint32_t j : order) {
-      out.point.push_back(j);
-      out.log_weight.push_back(log_weight[j]);
+    for (std::size_t t = 0; t < order.size(); ++t) {
+      out.point[t] = order[t];
+      out.log_weight[t] = log_weight[order[t]];
     }
-    return;
+    return {order.size(), 0.0};
   }
   // Weights relative to the patch's heaviest: a patch in the tail is reduced as well as any other.
-  patch_log_weight_.resize(patch.size());
-  for (std::size_t t = 0; t < order.size(); ++t) patch_log_weight_[t] = log_weight[order[t]];
-  const double heaviest = *std::max_element(patch_log_weight_.begin(), patch_log_weight_.end());
+  log_weight_.resize(patch.size());
+  for (std::size_t t = 0; t < order.size(); ++t) log_weight_[t] = log_weight[order[t]];
+  const double heaviest = *std::max_element(log_weight_.begin(), log_weight_.end());
   points_.reserve(d, patch.size());
-  const double weight = relative_weights(patch_log_weight_, heaviest, points_.weight.data());
+  const double weight = relative_weights(log_weight_, heaviest, points_.weight.data());
   std::size_t n = 0;
   for (std::size_t t = 0; t < order.size(); ++t) {
     points_.weight[n] = points_.weight[t];
@@ -50,7 +86,7 @@ void SpaceRecombination::reduce_patch(const Patch& patch, std::span<const double
     n += points_.weight[n] > 0 ? 1 : 0;
   }
   points_.count = n;
-  fill_box(patch);
+  fill_box(partition, patch);
   double change = 0;
   if (points_.dimension == 0 || degree == 0)
     change = keep_nearest_to_mean(weight);
@@ -59,19 +95,19 @@ void SpaceRecombination::reduce_patch(const Patch& patch, std::span<const double
     polynomials.taylor_weights({half_.data(), points_.dimension}, importance_);
     change = caratheodory_.reduce(polynomials, importance_, points_);
   }
-  out.discarded += change * weight * std::exp(heaviest - largest);
   for (std::size_t j = 0; j < points_.count; ++j) {
-    out.point.push_back(order[points_.label[j]]);
-    out.log_weight.push_back(heaviest + std::log(points_.weight[j]));
+    out.point[j] = order[points_.label[j]];
+    out.log_weight[j] = heaviest + std::log(points_.weight[j]);
   }
+  return {points_.count, change * weight * std::exp(heaviest - largest)};
 }
 
 /// The patch's components become coordinates on [-1,1]; those that are constant are left out.
-void SpaceRecombination::fill_box(const Patch& patch) {
+void PatchReduction::fill_box(const SpacePartition& partition, const Patch& patch) {
   std::size_t varying = 0;
-  half_.resize(partition_.dimension());
-  for (std::size_t i = 0; i < partition_.dimension(); ++i) {
-    const std::span<const double> x = partition_.component(i).subspan(patch.begin, patch.size());
+  half_.resize(partition.dimension());
+  for (std::size_t i = 0; i < partition.dimension(); ++i) {
+    const std::span<const double> x = partition.component(i).subspan(patch.begin, patch.size());
     const std::span<double> z(points_.z.data() + varying * points_.stride, points_.count);
     for (std::size_t j = 0; j < z.size(); ++j) z[j] = x[points_.label[j]];
     const auto [low, high] = std::minmax_element(z.begin(), z.end());
@@ -84,7 +120,7 @@ void SpaceRecombination::fill_box(const Patch& patch) {
 }
 
 /// Degree 0. @return the l1 change of the mean, in the units of the partition
-double SpaceRecombination::keep_nearest_to_mean(double weight) {
+double PatchReduction::keep_nearest_to_mean(double weight) {
   const std::size_t d = points_.dimension, n = points_.count;
   const auto z = [&](std::size_t i, std::size_t j) -> double& { return points_.z[i * points_.stride + j]; };
   for (std::size_t i = 0; i < d; ++i) {
@@ -107,7 +143,7 @@ double SpaceRecombination::keep_nearest_to_mean(double weight) {
   return change;
 }
 
-const PolynomialBasis& SpaceRecombination::basis(std::size_t dimension, int degree) {
+const PolynomialBasis& PatchReduction::basis(std::size_t dimension, int degree) {
   if (degree != basis_degree_) basis_.clear();
   basis_degree_ = degree;
   if (basis_.size() <= dimension) basis_.resize(dimension + 1);

@@ -34,7 +34,7 @@ std::size_t write_live(std::span<const double> log_weight, std::size_t count, Ne
 // the places of its sites, and moved together if one has a dead site.
 template <class WalkFrom>
 void live_sites(std::span<const double> log_weight, WalkFrom walk_from, ThreadPool* threads,
-                std::vector<std::uint32_t>& out, std::vector<std::size_t>& live) {
+                Buffer<std::uint32_t>& out, std::vector<std::size_t>& live) {
   const std::size_t n = log_weight.size();
   resize_unspecified(out, n);
   live.resize((n + block - 1) / block);
@@ -58,7 +58,7 @@ constexpr auto as_stored = [](std::size_t first) { return [i = first]() mutable 
 
 }  // namespace
 
-void SiteOrdering::tree(const Sites& sites, std::vector<std::uint32_t>& visit) {
+void SiteOrdering::tree(const Sites& sites, Buffer<std::uint32_t>& visit) {
   const std::size_t n = sites.log_weight.size(), parents = sites.parents;
   if (parents == 0) return live_sites(sites.log_weight, as_stored, sites.threads, visit, live_);
   if (n % parents != 0)
@@ -77,24 +77,40 @@ void SiteOrdering::tree(const Sites& sites, std::vector<std::uint32_t>& visit) {
   live_sites(sites.log_weight, by_parent, sites.threads, visit, live_);
 }
 
-void SiteOrdering::spatial(const Sites& sites, const ParticleMasses& masses,
-                           std::vector<std::uint32_t>& visit) {
-  live_sites(sites.log_weight, as_stored, sites.threads, visit, live_);
+void SiteOrdering::spatial(const Sites& sites, const ParticleMasses& masses, Buffer<std::uint32_t>& visit) {
   draw_sample(masses);
+  if (masses.all_positive) {
+    resize_unspecified(visit, sites.log_weight.size());
+    sort_in_space(
+        sites, visit.size(), [](std::size_t i) { return static_cast<std::uint32_t>(i); }, visit);
+  } else {
+    live_sites(sites.log_weight, as_stored, sites.threads, visit, live_);
+    sort_in_space(
+        sites, visit.size(), [live = visit.data()](std::size_t i) { return live[i]; }, visit);
+  }
+}
+
+template <class Site>
+void SiteOrdering::sort_in_space(const Sites& sites, std::size_t live, Site site,
+                                 Buffer<std::uint32_t>& visit) {
   axes_.clear();
   Axis axis;
   for (std::size_t c = 0; c < sites.x.components(); ++c)
-    if (make_axis(sites, visit, c, axis)) axes_.push_back(axis);
-  if (axes_.empty()) return;
+    if (make_axis(sites, live, site, c, axis)) axes_.push_back(axis);
   if (axes_.size() > largest_hilbert_dimension)
     throw InputError(fmt::format("spatial order takes at most {} varying components; use tree order",
                                  largest_hilbert_dimension),
                      "spatial order", fmt::format("{}", axes_.size()));
-  resize_unspecified(items_, visit.size());
-  const ItemLayout layout = axes_.size() == 1 ? line_items(sites, visit) : curve_items(sites, visit);
-  for_blocks(sites.threads, visit.size(), block, [&](std::size_t first, std::size_t count, std::size_t) {
-    for (std::size_t i = first; i < first + count; ++i) visit[i] = layout.index(items_[i]);
-  });
+  const auto write = [&](auto site_at) {
+    for_blocks(sites.threads, live, block, [&](std::size_t first, std::size_t count, std::size_t) {
+      for (std::size_t i = first; i < first + count; ++i) visit[i] = site_at(i);
+    });
+  };
+  if (axes_.empty()) return write(site);
+  resize_unspecified(items_, live);
+  const ItemLayout layout =
+      axes_.size() == 1 ? line_items(sites, live, site) : curve_items(sites, live, site);
+  write([&](std::size_t i) { return layout.index(items_[i]); });
 }
 
 // Sites at equal steps of mass: a sample of the weighted measure. The k-th lies where the mass below reaches
@@ -118,17 +134,19 @@ void SiteOrdering::draw_sample(const ParticleMasses& masses) {
 }
 
 // False if the component is constant over the sites.
-bool SiteOrdering::make_axis(const Sites& sites, std::span<const std::uint32_t> live, std::size_t component,
+template <class Site>
+bool SiteOrdering::make_axis(const Sites& sites, std::size_t live, Site site, std::size_t component,
                              Axis& axis) {
   const std::span<const double> x = sites.x.component(component);
   constexpr double infinity = std::numeric_limits<double>::infinity();
-  range_.resize((live.size() + block - 1) / block);
-  for_blocks(sites.threads, live.size(), block, [&](std::size_t first, std::size_t count, std::size_t b) {
+  range_.resize((live + block - 1) / block);
+  for_blocks(sites.threads, live, block, [&](std::size_t first, std::size_t count, std::size_t b) {
     Range here;
-    for (const std::uint32_t i : live.subspan(first, count)) {
-      here.finite &= std::abs(x[i]) <= std::numeric_limits<double>::max();
-      here.least = x[i] < here.least ? x[i] : here.least;
-      here.most = x[i] > here.most ? x[i] : here.most;
+    for (std::size_t i = first; i < first + count; ++i) {
+      const double value = x[site(i)];
+      here.finite &= std::abs(value) <= std::numeric_limits<double>::max();
+      here.least = value < here.least ? value : here.least;
+      here.most = value > here.most ? value : here.most;
     }
     range_[b] = here;
   });
@@ -140,10 +158,10 @@ bool SiteOrdering::make_axis(const Sites& sites, std::span<const std::uint32_t> 
     most = std::max(most, r.most);
   }
   if (!finite)
-    for (const std::uint32_t i : live)
-      if (!std::isfinite(x[i]))
-        throw RunError(fmt::format("component {} of the state of site {} is not finite", component, i),
-                       "spatial order", fmt::format("{}", x[i]));
+    for (std::size_t i = 0; i < live; ++i)
+      if (!std::isfinite(x[site(i)]))
+        throw RunError(fmt::format("component {} of the state of site {} is not finite", component, site(i)),
+                       "spatial order", fmt::format("{}", x[site(i)]));
   if (!(least < most)) return false;
 
   sample_values_.clear();
@@ -169,16 +187,17 @@ bool SiteOrdering::make_axis(const Sites& sites, std::span<const std::uint32_t> 
   return true;
 }
 
-ItemLayout SiteOrdering::line_items(const Sites& sites, std::span<const std::uint32_t> live) {
+template <class Site>
+ItemLayout SiteOrdering::line_items(const Sites& sites, std::size_t live, Site site) {
   const std::span<const double> x = sites.x.component(axes_[0].component);
   const auto axis = axes_[0];
   // The index takes the bits it needs, the cell the others: children of a tree crowd near the points of a
   // lattice, and what shares a cell is sorted by comparison.
   const ItemLayout layout{static_cast<unsigned>(std::bit_width(x.size()))};
   const double cells = std::ldexp(1.0, std::min(64 - static_cast<int>(layout.index_bits), 52));
-  for_blocks(sites.threads, live.size(), block, [&](std::size_t first, std::size_t count, std::size_t) {
+  for_blocks(sites.threads, live, block, [&](std::size_t first, std::size_t count, std::size_t) {
     for (std::size_t i = first; i < first + count; ++i)
-      items_[i] = layout.item(cell(x[live[i]], axis.low, axis.scale, cells), live[i]);
+      items_[i] = layout.item(cell(x[site(i)], axis.low, axis.scale, cells), site(i));
   });
   sort_items(items_, scratch_, layout, sites.threads);
   settle_equal_prefixes(
@@ -188,14 +207,15 @@ ItemLayout SiteOrdering::line_items(const Sites& sites, std::span<const std::uin
   return layout;
 }
 
-ItemLayout SiteOrdering::curve_items(const Sites& sites, std::span<const std::uint32_t> live) {
+template <class Site>
+ItemLayout SiteOrdering::curve_items(const Sites& sites, std::size_t live, Site site) {
   const std::size_t d = axes_.size();
   const unsigned bits = std::min(16U, static_cast<unsigned>(64 / d));
   const double cells = std::ldexp(1.0, static_cast<int>(bits));
   const unsigned unused = 64 - static_cast<unsigned>(d) * bits;
   constexpr ItemLayout layout;
   resize_unspecified(keys_, sites.log_weight.size());
-  for_blocks(sites.threads, live.size(), block, [&](std::size_t begin, std::size_t count, std::size_t) {
+  for_blocks(sites.threads, live, block, [&](std::size_t begin, std::size_t count, std::size_t) {
     HilbertAxes cells_of_axis;
     std::array<std::uint64_t, hilbert_block> key;
     for (std::size_t first = begin; first < begin + count; first += hilbert_block) {
@@ -204,13 +224,13 @@ ItemLayout SiteOrdering::curve_items(const Sites& sites, std::span<const std::ui
         const std::span<const double> x = sites.x.component(axes_[i].component);
         for (std::size_t l = 0; l < n; ++l)
           cells_of_axis[i][l] =
-              static_cast<std::uint32_t>(cell(x[live[first + l]], axes_[i].low, axes_[i].scale, cells));
+              static_cast<std::uint32_t>(cell(x[site(first + l)], axes_[i].low, axes_[i].scale, cells));
       }
       hilbert_keys(cells_of_axis, d, bits, key);
       for (std::size_t l = 0; l < n; ++l) {
         const std::uint64_t leading = key[l] << unused;
-        keys_[live[first + l]] = leading;
-        items_[first + l] = layout.item(layout.prefix(leading), live[first + l]);
+        keys_[site(first + l)] = leading;
+        items_[first + l] = layout.item(layout.prefix(leading), site(first + l));
       }
     }
   });

@@ -20,7 +20,7 @@ class SiteOrdering {
  public:
   /// Parent by parent, branch by branch; storage order if sites.parents is 0.
   /// @throws InputError if sites.parents does not divide the number of sites
-  void tree(const Sites& sites, std::vector<std::uint32_t>& visit);
+  void tree(const Sites& sites, Buffer<std::uint32_t>& visit);
 
   /// Sorted in space, equal positions by index. Components that are constant over the sites do not count. If
   /// one varies, exactly by its value. If k >= 2 vary, along a Hilbert curve over a grid of 2^min(16, [64/k])
@@ -30,7 +30,7 @@ class SiteOrdering {
   /// @param masses of the same sites
   /// @throws RunError naming the first site of positive weight whose state is not finite
   /// @throws InputError if more than 64 components vary
-  void spatial(const Sites& sites, const ParticleMasses& masses, std::vector<std::uint32_t>& visit);
+  void spatial(const Sites& sites, const ParticleMasses& masses, Buffer<std::uint32_t>& visit);
 
   /// Memory of the last sort, which is free until the next one.
   Buffer<std::uint64_t>& workspace() { return scratch_; }
@@ -44,10 +44,16 @@ class SiteOrdering {
     double least = std::numeric_limits<double>::infinity(), most = -least;
     bool finite = true;
   };
-  bool make_axis(const Sites& sites, std::span<const std::uint32_t> live, std::size_t component, Axis& axis);
+  // site(i), i = 0..live-1: the sites of positive weight by ascending index.
+  template <class Site>
+  void sort_in_space(const Sites& sites, std::size_t live, Site site, Buffer<std::uint32_t>& visit);
+  template <class Site>
+  bool make_axis(const Sites& sites, std::size_t live, Site site, std::size_t component, Axis& axis);
+  template <class Site>
+  ItemLayout line_items(const Sites& sites, std::size_t live, Site site);
+  template <class Site>
+  ItemLayout curve_items(const Sites& sites, std::size_t live, Site site);
   void draw_sample(const ParticleMasses& masses);
-  ItemLayout line_items(const Sites& sites, std::span<const std::uint32_t> live);
-  ItemLayout curve_items(const Sites& sites, std::span<const std::uint32_t> live);
 
   std::vector<Axis> axes_;
   std::vector<Range> range_;       ///< each block of sites

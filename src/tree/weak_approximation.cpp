@@ -119,10 +119,10 @@ class WeakTree {
       look_ahead(options_.grid.back() - options_.grid[j]);
       slabs_.thin(children_, value_, options_.nodes, random, *thinning_, selection_);
     } else {
-      thinning_->thin({children_.states, children_.log_weight, nodes_.size()}, options_.nodes, random,
-                      selection_);
+      thinning_->thin({children_.states, children_.log_weight, nodes_.size(), &grower_.threads()},
+                      options_.nodes, random, selection_);
     }
-    select(children_, selection_, nodes_);
+    select(children_, selection_, nodes_, &grower_.threads());
     discarded_ += selection_.discarded;
   }
 
@@ -149,7 +149,8 @@ class WeakTree {
       for (std::size_t i = 0; i < parents; ++i)
         site_weight_[branch * parents + i] = nodes_.log_weight[i] + log_lambda_[branch];
     const ConstBatchView no_states(nullptr, 0, sites, sites);
-    thinning_->thin({no_states, site_weight_, parents}, options_.nodes, random, selection_);
+    thinning_->thin({no_states, site_weight_, parents, &grower_.threads()}, options_.nodes, random,
+                    selection_);
     grower_.grow_chosen(nodes_, length(j), selection_, children_, failures_);
     require_success(j);
     discount(children_);

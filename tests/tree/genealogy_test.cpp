@@ -28,7 +28,7 @@ BOOST_CONCEPT_ASSERT((boost::ReadablePropertyGraphConcept<Descent, NodeId, boost
 
 namespace {
 
-Generation generation(double time, std::vector<std::uint32_t> parent) {
+Generation generation(double time, const std::vector<std::uint32_t>& parent) {
   Generation g;
   const std::size_t n = parent.size();
   g.time = time;
@@ -37,7 +37,7 @@ Generation generation(double time, std::vector<std::uint32_t> parent) {
   g.log_weight.assign(n, 0.0);
   g.branch.assign(n, 0);
   for (std::size_t i = 0; i < n; ++i) g.branch[i] = static_cast<std::uint16_t>(i % 2);
-  g.parent = std::move(parent);
+  g.parent.assign(parent.begin(), parent.end());
   return g;
 }
 

@@ -22,19 +22,19 @@ struct Cloud {
     for (std::size_t i = 0; i < d; ++i)
       RandomStream{seed, 0, static_cast<std::uint32_t>(i)}.normals(0, x.component(i));
   }
-  std::vector<std::uint32_t> order(SiteOrdering& ordering) const {
+  Buffer<std::uint32_t> order(SiteOrdering& ordering) const {
     ParticleMasses m;
     assign_masses(log_weight, 100, m);
-    std::vector<std::uint32_t> visit;
+    Buffer<std::uint32_t> visit;
     ordering.spatial({x, log_weight, 0}, m, visit);
     return visit;
   }
-  std::vector<std::uint32_t> order() const {
+  Buffer<std::uint32_t> order() const {
     SiteOrdering ordering;
     return order(ordering);
   }
-  std::vector<std::uint32_t> sorted_by(std::size_t component) const {
-    std::vector<std::uint32_t> visit;
+  Buffer<std::uint32_t> sorted_by(std::size_t component) const {
+    Buffer<std::uint32_t> visit;
     for (std::uint32_t i = 0; i < log_weight.size(); ++i)
       if (log_weight[i] > -INFINITY) visit.push_back(i);
     std::stable_sort(visit.begin(), visit.end(),
@@ -44,7 +44,7 @@ struct Cloud {
 };
 
 // Mean distance between consecutive sites.
-double mean_step(const Cloud& c, const std::vector<std::uint32_t>& visit) {
+double mean_step(const Cloud& c, const Buffer<std::uint32_t>& visit) {
   double sum = 0;
   for (std::size_t k = 1; k < visit.size(); ++k) {
     double square = 0;
@@ -116,7 +116,7 @@ TEST_CASE("Components that do not vary do not count") {
     std::fill(c.x.component(i).begin(), c.x.component(i).end(), 7.5);
   CHECK(c.order() == c.sorted_by(3));
   std::fill(c.x.component(3).begin(), c.x.component(3).end(), -1.0);
-  std::vector<std::uint32_t> by_index(2000);
+  Buffer<std::uint32_t> by_index(2000);
   std::iota(by_index.begin(), by_index.end(), 0U);
   CHECK(c.order() == by_index);
   // A site without weight may differ, even be NaN.
@@ -144,9 +144,9 @@ TEST_CASE("In space neighbours in the order are near, in every dimension") {
     Cloud c(d, 4096);
     auto visit = c.order();
     const double curve = mean_step(c, visit);
-    std::vector<std::uint32_t> sorted = visit;
+    Buffer<std::uint32_t> sorted = visit;
     std::sort(sorted.begin(), sorted.end());
-    std::vector<std::uint32_t> all(4096);
+    Buffer<std::uint32_t> all(4096);
     std::iota(all.begin(), all.end(), 0U);
     CHECK(sorted == all);
     const double root = std::sqrt(2.0 * static_cast<double>(d));

@@ -1,6 +1,5 @@
 #pragma once
-/// Memory of a tree that grows: what is about to be overwritten need not be copied, nor be written first by
-/// the one thread that makes room for all. Both cost page faults, which no other thread shares.
+/// Memory for nodes by the million.
 #include <cstddef>
 #include <memory>
 #include <new>
@@ -9,6 +8,8 @@
 
 namespace wienertree {
 
+/// New elements have no value: what is about to be overwritten need not be written first by the one thread
+/// that makes room for all.
 template <class T>
 struct UnwrittenAllocator : std::allocator<T> {
   UnwrittenAllocator() = default;
@@ -32,13 +33,13 @@ struct UnwrittenAllocator : std::allocator<T> {
 template <class T>
 using Buffer = std::vector<T, UnwrittenAllocator<T>>;
 
-/// Sets the size; values are unspecified afterwards. A vector that must grow again gets twice the room.
+/// Sets the size; values are unspecified afterwards. A vector that must grow gets twice the room: what is
+/// never written costs addresses, not memory.
 template <class Vector>
 void resize_unspecified(Vector& v, std::size_t n) {
   if (n > v.capacity()) {
-    const std::size_t room = v.capacity() == 0 ? n : 2 * n;
     v = Vector();
-    v.reserve(room);
+    v.reserve(2 * n);
   }
   v.resize(n);
 }
