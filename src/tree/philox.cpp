@@ -16,6 +16,8 @@ std::array<std::uint64_t, 2> philox(const PhiloxStream& s, std::uint64_t counter
   return {std::uint64_t{r[1]} << 32 | r[0], std::uint64_t{r[3]} << 32 | r[2]};
 }
 
+namespace {
+
 void philox_portable(const PhiloxStream& s, std::uint64_t first, PhiloxBlock& out) {
   for (std::size_t c = 0; c < philox_block; ++c) {
     const auto [low, high] = philox(s, first + c);
@@ -25,7 +27,6 @@ void philox_portable(const PhiloxStream& s, std::uint64_t first, PhiloxBlock& ou
 }
 
 #if defined(__x86_64__)
-namespace {
 
 // One 32-bit word of a counter lies in the low half of each 64-bit lane. The upper halves may hold anything:
 // the multiplication reads the low halves only. A strand is a register of counters; as many strands are run
@@ -108,21 +109,25 @@ __attribute__((target("avx512f"))) void philox_avx512(const PhiloxStream& s, std
   }
 }
 
-using PhiloxFunction = void (*)(const PhiloxStream&, std::uint64_t, PhiloxBlock&);
-
-PhiloxFunction fastest_philox() {
-  if (__builtin_cpu_supports("avx512f") != 0) return philox_avx512;
-  return __builtin_cpu_supports("avx2") != 0 ? philox_avx2 : philox_portable;
-}
+#endif
 
 }  // namespace
 
+std::span<const PhiloxKernel> philox_kernels() {
+#if defined(__x86_64__)
+  static constexpr PhiloxKernel kernels[] = {philox_portable, philox_avx2, philox_avx512};
+  static const std::size_t count =
+      __builtin_cpu_supports("avx512f") ? 3 : (__builtin_cpu_supports("avx2") ? 2 : 1);
+  return {kernels, count};
+#else
+  static constexpr PhiloxKernel kernels[] = {philox_portable};
+  return kernels;
+#endif
+}
+
 void philox(const PhiloxStream& s, std::uint64_t first, PhiloxBlock& out) {
-  static const PhiloxFunction fastest = fastest_philox();
+  static const PhiloxKernel fastest = philox_kernels().back();
   fastest(s, first, out);
 }
-#else
-void philox(const PhiloxStream& s, std::uint64_t first, PhiloxBlock& out) { philox_portable(s, first, out); }
-#endif
 
 }  // namespace wienertree

@@ -24,12 +24,15 @@ struct PhiloxBlock {
   alignas(64) std::array<std::uint64_t, philox_block> low, high;
 };
 
+using PhiloxKernel = void (*)(const PhiloxStream& stream, std::uint64_t first, PhiloxBlock& out);
+
+/// By the fastest kernel.
 void philox(const PhiloxStream& stream, std::uint64_t first, PhiloxBlock& out);
+
+/// What this processor runs, slowest first: Random123's scalar code, AVX2, AVX-512. They give the same bits.
+std::span<const PhiloxKernel> philox_kernels();
 
 /// One counter: (low, high).
 std::array<std::uint64_t, 2> philox(const PhiloxStream& stream, std::uint64_t counter);
-
-/// The block by Random123's scalar code alone.
-void philox_portable(const PhiloxStream& stream, std::uint64_t first, PhiloxBlock& out);
 
 }  // namespace wienertree
