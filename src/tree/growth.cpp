@@ -17,12 +17,12 @@ namespace {
 constexpr std::size_t nodes_a_task = 16 * flow_block;
 constexpr std::size_t most_branches = std::size_t{1} << 16;
 
-// Parents whose families are grown in one task: few enough that they stay in cache with their children, and
-// that there are tasks for many threads; and a number that does not depend on the threads.
-std::size_t families_a_task(std::size_t parents, std::size_t branches) {
-  const std::size_t least = std::max<std::size_t>(1, 12 / branches);
-  const std::size_t most = std::max<std::size_t>(1, 192 / branches);
-  return std::clamp(parents / (16 * flow_block), least, most) * flow_block;
+// Parents in a block: enough that what a call costs is spread thin, few enough that they stay in cache with
+// their children and that there are blocks for many threads; and a number that does not depend on the
+// threads.
+std::size_t parents_a_block(std::size_t parents, std::size_t branches) {
+  constexpr std::size_t least = 8;
+  return std::clamp(parents / (16 * flow_block), least, std::max(least, 192 / branches)) * flow_block;
 }
 
 void shape_children(const Generation& parents, const CubatureFormula& formula, double s,
@@ -194,15 +194,23 @@ void grow(const Generation& parents, const CubatureFormula& formula, double s,
     failures.insert(failures.end(), failed.begin(), failed.end());
   };
   const std::size_t branches = formula.paths.size();
-  const std::size_t nodes = parents.size(), block = families_a_task(nodes, branches);
-  threads.for_each((nodes + block - 1) / block, [&](std::size_t task, std::size_t thread) {
-    const std::size_t first = task * block, count = std::min(block, nodes - first);
-    if (visitor != nullptr) visitor->parents(first, count, thread);
-    for (std::size_t branch = 0; branch < branches; ++branch) {
-      grow_branch(branch, first, count, thread);
-      if (visitor != nullptr) visitor->children(first, branch * nodes + first, count, thread);
-    }
-  });
+  const std::size_t nodes = parents.size(), block = parents_a_block(nodes, branches);
+  const std::size_t blocks = (nodes + block - 1) / block;
+  const auto count_from = [&](std::size_t first) { return std::min(block, nodes - first); };
+  if (visitor == nullptr)
+    threads.for_each(blocks * branches, [&](std::size_t task, std::size_t thread) {
+      const std::size_t first = task / branches * block;
+      grow_branch(task % branches, first, count_from(first), thread);
+    });
+  else
+    threads.for_each(blocks, [&](std::size_t task, std::size_t thread) {
+      const std::size_t first = task * block, count = count_from(first);
+      visitor->parents(first, count, thread);
+      for (std::size_t branch = 0; branch < branches; ++branch) {
+        grow_branch(branch, first, count, thread);
+        visitor->children(first, branch * nodes + first, count, thread);
+      }
+    });
   sort_by_node(failures);
 }
 

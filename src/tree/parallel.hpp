@@ -7,8 +7,8 @@
 
 namespace wienertree {
 
-/// Tasks are handed out in ascending order, so that a task may run on any thread: work must depend on the
-/// task only, never on the thread, which is there to choose scratch memory. A pool of size 1 has no thread of
+/// A task may run on any thread: work must depend on the task only, never on the thread, which is there to
+/// choose scratch memory. A pool of size 1 has no thread of
 /// its own and runs everything in the caller's.
 class ThreadPool {
  public:
@@ -21,9 +21,9 @@ class ThreadPool {
   std::size_t size() const { return size_; }
 
   /// Calls body(task, thread) for every task in 0..tasks-1, thread in 0..size()-1, and returns when all are
-  /// done. After an exception no further task starts, and the exception of the lowest task that threw is
-  /// rethrown: the same one for any number of threads. Not to be called from within a body, nor by two
-  /// callers at once. Allocates nothing.
+  /// done. After an exception no task above the one that threw starts, and the exception of the lowest task
+  /// that threw is rethrown: the same one for any number of threads. Not to be called from within a body, nor
+  /// by two callers at once. Allocates nothing.
   template <class Body>
   void for_each(std::size_t tasks, Body&& body) {
     run(
