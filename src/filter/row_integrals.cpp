@@ -1,58 +1,89 @@
 // Compiled with -ffp-contract=off: every instruction set returns the same bits.
 #include "wienertree/filter/row_integrals.hpp"
 
+#include <cstring>
+
 #include "wienertree/tree/clones.hpp"
+#include "wienertree/tree/lane_sum.hpp"
 
 namespace wienertree {
 namespace {
 
-constexpr std::size_t lanes = 8;  ///< partial sums, which vector registers hold
+#define WIENERTREE_INLINE [[gnu::always_inline]] inline
 
-template <class Add>
-[[gnu::always_inline]] inline void for_gaps(std::size_t gaps, Add add) {
+// Values r, r+1, .. of a column: one, or as many as there are lanes.
+WIENERTREE_INLINE void load(const double* x, std::size_t stride, std::size_t r, double& out) {
+  out = x[r * stride];
+}
+WIENERTREE_INLINE void load(const double* x, std::size_t stride, std::size_t r, SumLanes& out) {
+  if (stride == 1)
+    std::memcpy(&out, x + r, sizeof out);
+  else
+    for (std::size_t lane = 0; lane < sum_lanes; ++lane) out[lane] = x[(r + lane) * stride];
+}
+
+// total[k] becomes the sum over the gaps r = 0..gaps-1 of what add(r, sums) adds to sums[k], k = 0..K-1; sums
+// are doubles or have lanes.
+template <std::size_t K, class Add>
+WIENERTREE_INLINE void sum_gaps(std::size_t gaps, Add add, double (&total)[K]) {
+  SumLanes in_lanes[K] = {};
   std::size_t r = 0;
-  for (; r + lanes <= gaps; r += lanes)
-    for (std::size_t lane = 0; lane < lanes; ++lane) add(r + lane, lane);
-  for (; r < gaps; ++r) add(r, 0);
+  for (; r + sum_lanes <= gaps; r += sum_lanes) add(r, in_lanes);
+  for (double& sum : total) sum = 0;
+  for (; r < gaps; ++r) add(r, total);
+  for (std::size_t k = 0; k < K; ++k)
+    for (std::size_t lane = 0; lane < sum_lanes; ++lane) total[k] += in_lanes[k][lane];
 }
 
 // On a gap [u, v] of length delta with U = p, q at its ends: delta/2 (p + q), delta/6 (p (2u + v) + q (u +
 // 2v)), delta/12 (p (3u^2 + 2uv + v^2) + q (u^2 + 2uv + 3v^2)).
-[[gnu::always_inline]] inline RowIntegrals integrals(const double* t, const double* y, std::size_t stride,
-                                                     std::size_t gaps) {
+WIENERTREE_INLINE RowIntegrals integrals(const double* t, const double* y, std::size_t stride,
+                                         std::size_t gaps) {
   const double start = t[0], last = y[gaps * stride];
-  double i0[lanes] = {}, j1[lanes] = {}, j2[lanes] = {};
-  for_gaps(
-      gaps, [&](std::size_t r, std::size_t lane) __attribute__((always_inline)) {
-        const double u = t[r] - start, v = t[r + 1] - start, delta = v - u;
-        const double p = delta * (last - y[r * stride]), q = delta * (last - y[(r + 1) * stride]);
-        const double uu = u * u, vv = v * v, square = (u + v) * (u + v);
-        i0[lane] += p + q;
-        j1[lane] += p * (u + u + v) + q * (u + v + v);
-        j2[lane] += p * (uu + uu + square) + q * (vv + vv + square);
-      });
-  RowIntegrals sum;
-  for (std::size_t lane = 0; lane < lanes; ++lane) {
-    sum.i0 += i0[lane] / 2;
-    sum.j1 += j1[lane] / 6;
-    sum.j2 += j2[lane] / 12;
-  }
-  return sum;
+  double total[3];
+  sum_gaps(
+      gaps,
+      [&]<class V>(std::size_t r, V(&sums)[3]) __attribute__((always_inline)) {
+        V u, v, y_u, y_v;
+        load(t, 1, r, u);
+        load(t, 1, r + 1, v);
+        load(y, stride, r, y_u);
+        load(y, stride, r + 1, y_v);
+        u -= start;
+        v -= start;
+        const V p = (v - u) * (last - y_u), q = (v - u) * (last - y_v);
+        const V uu = u * u, vv = v * v, square = (u + v) * (u + v);
+        sums[0] += p + q;
+        sums[1] += p * (u + u + v) + q * (u + v + v);
+        sums[2] += p * (uu + uu + square) + q * (vv + vv + square);
+      },
+      total);
+  return {total[0] / 2, total[1] / 6, total[2] / 12};
 }
 
 // delta/6 (2 (p_a p_b + q_a q_b) + p_a q_b + q_a p_b) on a gap.
-[[gnu::always_inline]] inline double products(const double* t, const double* a, const double* b,
-                                              std::size_t stride, std::size_t gaps) {
+WIENERTREE_INLINE double products(const double* t, const double* a, const double* b, std::size_t stride,
+                                  std::size_t gaps) {
   const double last_a = a[gaps * stride], last_b = b[gaps * stride];
-  double sums[lanes] = {}, sum = 0;
-  for_gaps(
-      gaps, [&](std::size_t r, std::size_t lane) __attribute__((always_inline)) {
-        const double pa = last_a - a[r * stride], qa = last_a - a[(r + 1) * stride];
-        const double pb = last_b - b[r * stride], qb = last_b - b[(r + 1) * stride];
-        sums[lane] += (t[r + 1] - t[r]) * (2 * (pa * pb + qa * qb) + pa * qb + qa * pb);
-      });
-  for (const double x : sums) sum += x;
-  return sum / 6;
+  double total[1];
+  sum_gaps(
+      gaps,
+      [&]<class V>(std::size_t r, V(&sums)[1]) __attribute__((always_inline)) {
+        V u, v, p_a, q_a, p_b, q_b;
+        load(t, 1, r, u);
+        load(t, 1, r + 1, v);
+        load(a, stride, r, p_a);
+        load(a, stride, r + 1, q_a);
+        load(b, stride, r, p_b);
+        load(b, stride, r + 1, q_b);
+        p_a = last_a - p_a;
+        q_a = last_a - q_a;
+        p_b = last_b - p_b;
+        q_b = last_b - q_b;
+        sums[0] += (v - u) * (2.0 * (p_a * p_b + q_a * q_b) + p_a * q_b + q_a * p_b);
+      },
+      total);
+  return total[0] / 6;
 }
 
 }  // namespace
@@ -69,16 +100,19 @@ WIENERTREE_CLONES double row_products(const double* t, const double* a, const do
 }
 
 WIENERTREE_CLONES double row_bridge_variance(const double* t, std::size_t gaps) {
-  double squares[lanes] = {}, cubes[lanes] = {}, square = 0, cube = 0;
-  for_gaps(
-      gaps, [&](std::size_t r, std::size_t lane) __attribute__((always_inline)) {
-        const double delta = t[r + 1] - t[r];
-        squares[lane] += delta * delta;
-        cubes[lane] += delta * delta * delta;
-      });
-  for (const double x : squares) square += x;
-  for (const double x : cubes) cube += x;
-  return square / 6 - cube / (12 * (t[gaps] - t[0]));
+  double total[2];
+  sum_gaps(
+      gaps,
+      [&]<class V>(std::size_t r, V(&sums)[2]) __attribute__((always_inline)) {
+        V u, v;
+        load(t, 1, r, u);
+        load(t, 1, r + 1, v);
+        const V delta = v - u, square = delta * delta;
+        sums[0] += square;
+        sums[1] += square * delta;
+      },
+      total);
+  return total[0] / 6 - total[1] / (12 * (t[gaps] - t[0]));
 }
 
 }  // namespace wienertree
