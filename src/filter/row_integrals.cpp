@@ -1,8 +1,6 @@
 // Compiled with -ffp-contract=off: every instruction set returns the same bits.
 #include "wienertree/filter/row_integrals.hpp"
 
-#include <cstring>
-
 #include "wienertree/tree/clones.hpp"
 #include "wienertree/tree/lane_sum.hpp"
 
@@ -17,7 +15,7 @@ WIENERTREE_INLINE void load(const double* x, std::size_t stride, std::size_t r, 
 }
 WIENERTREE_INLINE void load(const double* x, std::size_t stride, std::size_t r, SumLanes& out) {
   if (stride == 1)
-    std::memcpy(&out, x + r, sizeof out);
+    load_lanes(x + r, out);
   else
     for (std::size_t lane = 0; lane < sum_lanes; ++lane) out[lane] = x[(r + lane) * stride];
 }

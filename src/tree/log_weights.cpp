@@ -1,7 +1,6 @@
 #include "wienertree/tree/log_weights.hpp"
 
 #include <algorithm>
-#include <cstring>
 #include <limits>
 
 #include "wienertree/tree/clones.hpp"
@@ -18,7 +17,7 @@ WIENERTREE_CLONES LargestLogWeight largest_log_weight(std::span<const double> lo
   auto valid = largest <= most, positive = valid;
   std::size_t i = 0;
   for (; i + sum_lanes <= n; i += sum_lanes) {
-    std::memcpy(&x, a + i, sizeof x);
+    load_lanes(a + i, x);
     largest = x > largest ? x : largest;
     valid &= x <= most;
     positive &= x >= -most;
@@ -44,9 +43,8 @@ WIENERTREE_CLONES double relative_weights(std::span<const double> log_weight, do
                   [&](std::size_t i) { return w[i] = elementary::exp_nonpositive(a[i] - largest); });
 }
 
-WIENERTREE_CLONES double sum_of_squares(std::span<const double> weight) {
-  const double* w = weight.data();
-  return lane_sum(0, weight.size(), [&](std::size_t i) { return w[i] * w[i]; });
+WIENERTREE_CLONES double sum_of_squares(std::span<const double> w) {
+  return lane_dot(w.data(), w.data(), w.size());
 }
 
 }  // namespace wienertree

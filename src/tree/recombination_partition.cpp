@@ -13,12 +13,10 @@ namespace {
 
 constexpr std::size_t block = 64;
 
-WIENERTREE_CLONES double total(const double* w, std::size_t n) {
-  return lane_sum(0, n, [&](std::size_t j) { return w[j]; });
-}
+WIENERTREE_CLONES double total(const double* w, std::size_t n) { return lane_total(w, n); }
 
 WIENERTREE_CLONES double weighted_total(const double* w, const double* z, std::size_t n) {
-  return lane_sum(0, n, [&](std::size_t j) { return w[j] * z[j]; });
+  return lane_dot(w, z, n);
 }
 
 // square[j] becomes square[j]^(power/2), power >= 1.
@@ -39,7 +37,7 @@ WIENERTREE_CLONES void add_moments(const double* z, std::size_t stride, std::siz
   for (std::size_t j = 0; j < n; ++j) distance[j] = 0;
   const auto add = [&](std::array<double, block>& square, double& sum) {
     half_powers(square.data(), n, power);
-    sum += lane_sum(0, n, [&](std::size_t j) { return w[j] * square[j]; });
+    sum += lane_dot(w, square.data(), n);
   };
   for (std::size_t i = 0; i < d; ++i) {
     for (std::size_t j = 0; j < n; ++j) {

@@ -7,9 +7,15 @@
 namespace wienertree::recombination {
 
 WIENERTREE_CLONES MeanDeviation mean_deviation(const double* x, const double* w, std::size_t n) {
-  const double mass = lane_sum(0, n, [&](std::size_t i) { return w[i]; });
-  const double mean = lane_sum(0, n, [&](std::size_t i) { return w[i] * x[i]; }) / mass;
-  const double square = lane_sum(0, n, [&](std::size_t i) { return w[i] * ((x[i] - mean) * (x[i] - mean)); });
+  const double mass = lane_total(w, n), mean = lane_dot(w, x, n) / mass;
+  const double square = lane_sum_of_loads(
+      n, [&]<class V>(std::size_t i, V & term) __attribute__((always_inline)) {
+        V distance;
+        load_lanes(x + i, distance);
+        distance -= mean;
+        load_lanes(w + i, term);
+        term *= distance * distance;
+      });
   return {mean, std::sqrt(square / mass)};
 }
 
