@@ -69,6 +69,12 @@ std::string escaped(const std::string& text) {
   return out;
 }
 
+// Numbers like 10 000 are not broken between lines.
+std::string prose(const std::string& text) {
+  static const std::regex thousands("([0-9]) (?=[0-9]{3}($|[^0-9]))");
+  return std::regex_replace(escaped(text), thousands, "$1&nbsp;");
+}
+
 std::string base64(const std::string& bytes) {
   constexpr const char* digits = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
   std::string out;
@@ -138,7 +144,7 @@ std::string claims_section(const Study& study, const StudyResults& results) {
         "<tr><td class=\"text wrap\">{}</td><td data-name=\"found\">{}</td><td data-name=\"95 %\">{}</td><td "
         "data-name=\"claimed\">{} … {}</td><td class=\"text "
         "{}\">{}</td></tr>\n",
-        escaped(study.claims[c].text), number(o.value), interval(o.low, o.high), number(study.claims[c].low),
+        prose(study.claims[c].text), number(o.value), interval(o.low, o.high), number(study.claims[c].low),
         number(study.claims[c].high), o.inside ? "yes" : "no", o.inside ? "holds" : "does not hold");
   }
   return html + "</table></div>\n";
@@ -202,11 +208,11 @@ std::string study_page(const Study& study, const StudyResults& results,
       "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n"
       "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n<title>{0}</title>\n"
       "<style>{1}</style>\n</head>\n<body>\n<h1>{0}</h1>\n",
-      escaped(study.title), style);
+      prose(study.title), style);
   if (!study.paper.empty())
-    html += fmt::format("<p><span class=\"who\">Published:</span> {}</p>\n", escaped(study.paper));
+    html += fmt::format("<p><span class=\"who\">Published:</span> {}</p>\n", prose(study.paper));
   if (!study.finding.empty())
-    html += fmt::format("<p><span class=\"who\">Found:</span> {}</p>\n", escaped(study.finding));
+    html += fmt::format("<p><span class=\"who\">Found:</span> {}</p>\n", prose(study.finding));
   for (std::size_t p = 0; p < pictures.size(); ++p)
     html += figure(study.plots[p], results.lines[p], pictures[p], p + 1);
   html += claims_section(study, results) + slopes_section(study, results) + table_section(study, results) +

@@ -40,7 +40,8 @@ __attribute__((target("avx2"))) void philox_avx2(const PhiloxStream& s, std::uin
   for (std::size_t c = 0; c < philox_block; c += width * strands) {
     __m256i c0[strands], c1[strands], c2[strands], c3[strands];
     for (std::size_t g = 0; g < strands; ++g) {
-      c0[g] = _mm256_add_epi64(_mm256_set1_epi64x(static_cast<long long>(first + c + width * g)),
+      const std::uint64_t counter = first + c + width * g;
+      c0[g] = _mm256_add_epi64(_mm256_set1_epi64x(static_cast<long long>(counter)),
                                _mm256_setr_epi64x(0, 1, 2, 3));
       c1[g] = _mm256_xor_si256(_mm256_srli_epi64(c0[g], 32), _mm256_set1_epi64x(s.tag));
       c2[g] = _mm256_set1_epi64x(s.step);
@@ -78,7 +79,8 @@ __attribute__((target("avx512f"))) void philox_avx512(const PhiloxStream& s, std
   const __m512i low_half = _mm512_set1_epi64(0xffffffff);
   __m512i c0[strands], c1[strands], c2[strands], c3[strands];
   for (std::size_t g = 0; g < strands; ++g) {
-    c0[g] = _mm512_add_epi64(_mm512_set1_epi64(static_cast<long long>(first + width * g)),
+    const std::uint64_t counter = first + width * g;
+    c0[g] = _mm512_add_epi64(_mm512_set1_epi64(static_cast<long long>(counter)),
                              _mm512_setr_epi64(0, 1, 2, 3, 4, 5, 6, 7));
     c1[g] = _mm512_xor_si512(_mm512_srli_epi64(c0[g], 32), _mm512_set1_epi64(s.tag));
     c2[g] = _mm512_set1_epi64(s.step);
