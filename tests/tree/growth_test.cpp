@@ -1,6 +1,7 @@
 // Growing a generation, selecting from it, and doing so without allocating.
 #include "wienertree/tree/growth.hpp"
 
+#include <atomic>
 #include <bit>
 #include <catch2/catch.hpp>
 #include <cmath>
@@ -133,6 +134,44 @@ TEST_CASE("The same bytes for any number of threads, failures included") {
       CHECK(failures_many[k].value == failures_one[k].value);
     }
     CHECK(grower.statistics().node_segments == parents.size() * 5);
+  }
+}
+
+TEST_CASE("A visitor sees every parent before its children, and every child moved") {
+  const CubatureFormula formula = three_paths();
+  const Generation parents = parents_of(20011, 2);
+  Generation alone;
+  std::vector<NodeFailure> failures;
+  TreeGrower(std::make_unique<Affine>(), formula, 1).grow(parents, 0.01, alone, failures);
+  struct Visitor final : FamilyVisitor {
+    const Generation &expected, &seen;
+    std::vector<int> parents_seen, children_seen;
+    std::vector<std::size_t> visited_in;  // the thread of each parent
+    std::atomic<bool> in_order{true}, moved{true};
+    Visitor(const Generation& e, const Generation& s, std::size_t n)
+        : expected(e), seen(s), parents_seen(n), children_seen(3 * n), visited_in(n) {}
+    void parents(std::size_t first, std::size_t count, std::size_t thread) override {
+      for (std::size_t n = first; n < first + count; ++n) ++parents_seen[n], visited_in[n] = thread;
+    }
+    void children(std::size_t first, std::size_t child, std::size_t count, std::size_t thread) override {
+      for (std::size_t n = 0; n < count; ++n) {
+        ++children_seen[child + n];
+        if (parents_seen[first + n] != 1 || visited_in[first + n] != thread) in_order = false;
+        if (seen.parent[child + n] != first + n || seen.states(1, child + n) != expected.states(1, child + n))
+          moved = false;
+      }
+    }
+  };
+  for (const std::size_t threads : {1U, 3U}) {
+    Generation children;
+    Visitor visitor(alone, children, parents.size());
+    TreeGrower(std::make_unique<Affine>(), formula, threads)
+        .grow(parents, 0.01, children, failures, &visitor);
+    CHECK(same_bytes(alone, children));
+    CHECK(visitor.parents_seen == std::vector<int>(parents.size(), 1));
+    CHECK(visitor.children_seen == std::vector<int>(3 * parents.size(), 1));
+    CHECK(visitor.in_order);
+    CHECK(visitor.moved);
   }
 }
 
