@@ -15,7 +15,7 @@ namespace {
 
 WIENERTREE_CLONES bool all_within(std::span<const double> x, double lower, double upper) {
   const double* v = x.data();
-  const auto outside = [&](std::size_t n) { return (v[n] >= lower) & (v[n] <= upper) ? 0.0 : 1.0; };
+  const auto outside = [&](std::size_t n) { return ((v[n] >= lower) & (v[n] <= upper)) ? 0.0 : 1.0; };
   return lane_sum(0, x.size(), outside) == 0.0;
 }
 
