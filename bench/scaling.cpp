@@ -1,7 +1,7 @@
 /// Time and peak memory of the KLV filter against N, n, dimension and threads. Every run is a process of its
 /// own, so that its peak is its own.
 ///
-///     build/bench/bench/scaling            (five minutes; 4 GiB for N = 1e7)
+///     build/bench/bench/scaling            (three minutes; 3 GiB for N = 1e7)
 ///     build/bench/bench/scaling 1e6        up to N = 1e6
 ///     build/bench/bench/scaling benes 1e5 100 1    one run (model, N, n, threads), to be profiled
 #include <fmt/format.h>

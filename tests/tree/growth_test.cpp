@@ -14,7 +14,7 @@ using namespace wienertree;
 namespace {
 
 /// x_i += D_0 + x_i D_1 on all components; fails where component 0 exceeds a limit. What happens to a node
-/// depends on its place in its block of 64, as in a batched solver.
+/// depends on its place in its block of `flow_block` nodes, as in a batched solver.
 class Affine final : public Flow {
  public:
   explicit Affine(double limit = 1e300) : limit_(limit) {}
