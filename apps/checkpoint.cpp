@@ -8,7 +8,7 @@
 #include <sstream>
 
 #include "checksum.hpp"
-#include "wienertree/model/error.hpp"
+#include "wienertree/numeric/error.hpp"
 
 namespace wienertree::app {
 namespace {

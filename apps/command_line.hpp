@@ -14,7 +14,7 @@
 #include <utility>
 #include <vector>
 
-#include "wienertree/model/error.hpp"
+#include "wienertree/numeric/error.hpp"
 
 namespace wienertree::app {
 

@@ -7,7 +7,7 @@
 #include <cstdlib>
 #include <system_error>
 
-#include "wienertree/model/error.hpp"
+#include "wienertree/numeric/error.hpp"
 #include "wienertree/model/text/location.hpp"
 
 namespace wienertree::app {

@@ -8,7 +8,7 @@
 #include "wienertree/cubature/catalogue.hpp"
 #include "wienertree/cubature/formula_file.hpp"
 #include "wienertree/cubature/lie_formula_file.hpp"
-#include "wienertree/model/error.hpp"
+#include "wienertree/numeric/error.hpp"
 
 namespace wienertree::app {
 namespace {

@@ -14,7 +14,7 @@
 #include <cstdlib>
 #include <system_error>
 
-#include "wienertree/model/error.hpp"
+#include "wienertree/numeric/error.hpp"
 
 extern char** environ;
 

@@ -15,7 +15,7 @@
 #include <filesystem>
 #include <system_error>
 
-#include "wienertree/model/error.hpp"
+#include "wienertree/numeric/error.hpp"
 
 namespace wienertree::app {
 namespace {

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "gnuplot.hpp"
-#include "wienertree/model/state_archive.hpp"
+#include "wienertree/numeric/state_archive.hpp"
 
 namespace wienertree::app {
 

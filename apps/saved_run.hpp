@@ -8,7 +8,7 @@
 #include "command_line.hpp"
 #include "interruption.hpp"
 #include "wienertree/model/model.hpp"
-#include "wienertree/model/state_archive.hpp"
+#include "wienertree/numeric/state_archive.hpp"
 
 namespace wienertree::app {
 

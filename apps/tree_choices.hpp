@@ -2,7 +2,7 @@
 /// The words that stand for how a tree is grown and thinned, shared by all subcommands.
 #include "command_line.hpp"
 #include "wienertree/cubature/flow.hpp"
-#include "wienertree/tree/thinning.hpp"
+#include "wienertree/thinning/thinning.hpp"
 
 namespace wienertree::app {
 

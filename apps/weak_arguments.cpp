@@ -10,7 +10,7 @@
 #include "formula_choice.hpp"
 #include "tree_choices.hpp"
 #include "wienertree/cubature/lie_formula.hpp"
-#include "wienertree/tree/weak_smoothing.hpp"
+#include "wienertree/weak/smoothing.hpp"
 
 namespace wienertree::app {
 namespace {

@@ -8,7 +8,7 @@
 #include "command_line.hpp"
 #include "table.hpp"
 #include "wienertree/model/text_model.hpp"
-#include "wienertree/tree/weak_run.hpp"
+#include "wienertree/weak/run.hpp"
 
 namespace wienertree::app {
 

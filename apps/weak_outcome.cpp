@@ -4,7 +4,7 @@
 
 #include <cmath>
 
-#include "wienertree/tree/weak_control.hpp"
+#include "wienertree/weak/control.hpp"
 
 namespace wienertree::app {
 

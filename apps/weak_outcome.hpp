@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "weak_arguments.hpp"
-#include "wienertree/tree/weak_journal.hpp"
+#include "wienertree/weak/journal.hpp"
 
 namespace wienertree::app {
 

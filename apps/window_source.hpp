@@ -6,7 +6,7 @@
 #include <string>
 
 #include "wienertree/filter/window.hpp"
-#include "wienertree/model/state_archive.hpp"
+#include "wienertree/numeric/state_archive.hpp"
 
 namespace wienertree::app {
 

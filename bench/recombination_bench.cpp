@@ -9,7 +9,7 @@
 
 #include <cmath>
 
-#include "wienertree/tree/recombination.hpp"
+#include "wienertree/thinning/recombination/recombination.hpp"
 
 using namespace wienertree;
 

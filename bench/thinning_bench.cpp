@@ -15,11 +15,11 @@
 #include <string>
 #include <vector>
 
-#include "wienertree/tree/masses.hpp"
-#include "wienertree/tree/resampling.hpp"
-#include "wienertree/tree/site_order.hpp"
-#include "wienertree/tree/tbba.hpp"
-#include "wienertree/tree/thinning.hpp"
+#include "wienertree/thinning/masses.hpp"
+#include "wienertree/thinning/resampling.hpp"
+#include "wienertree/thinning/site_order.hpp"
+#include "wienertree/thinning/tbba.hpp"
+#include "wienertree/thinning/thinning.hpp"
 
 namespace {
 

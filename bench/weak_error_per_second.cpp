@@ -17,8 +17,8 @@
 #include "heston_rivals.hpp"
 #include "wienertree/cubature/construct.hpp"
 #include "wienertree/model/text_model.hpp"
-#include "wienertree/tree/random.hpp"
-#include "wienertree/tree/weak_run.hpp"
+#include "wienertree/numeric/random.hpp"
+#include "wienertree/weak/run.hpp"
 
 using namespace wienertree;
 

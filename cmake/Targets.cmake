@@ -14,9 +14,9 @@ if(WIENERTREE_SANITIZE)
   target_link_options(wienertree_build_settings INTERFACE -fsanitize=${WIENERTREE_SANITIZE})
 endif()
 
-# wienertree_room(<name> <sources>...): one folder of src/ as a static library. The arrows of the house go one way
-# (filter -> tree -> cubature -> model) and each room links only the rooms below it.
-function(wienertree_room name)
+# wienertree_layer(<name> <sources>...): one folder of src/ as a static library, which links only the layers below it
+# (scripts/check-layers names them).
+function(wienertree_layer name)
   add_library(wienertree_${name} STATIC ${ARGN})
   add_library(wienertree::${name} ALIAS wienertree_${name})
   set_target_properties(wienertree_${name} PROPERTIES EXPORT_NAME ${name})

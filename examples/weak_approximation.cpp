@@ -7,7 +7,7 @@
 
 #include "wienertree/cubature/construct.hpp"
 #include "wienertree/model/cpp_model.hpp"
-#include "wienertree/tree/weak_run.hpp"
+#include "wienertree/weak/run.hpp"
 
 using namespace wienertree;
 

@@ -14,7 +14,7 @@
 #include <system_error>
 
 #include "../output.hpp"
-#include "wienertree/model/error.hpp"
+#include "wienertree/numeric/error.hpp"
 
 namespace wienertree::app {
 namespace {

@@ -11,7 +11,7 @@
 #include <tuple>
 
 #include "../progress.hpp"
-#include "wienertree/tree/parallel.hpp"
+#include "wienertree/numeric/parallel.hpp"
 
 namespace wienertree::app {
 namespace {

@@ -2,7 +2,7 @@
 #include <regex>
 
 #include "bindings.hpp"
-#include "wienertree/model/error.hpp"
+#include "wienertree/numeric/error.hpp"
 
 namespace wienertree::python {
 namespace {

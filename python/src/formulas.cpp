@@ -9,7 +9,7 @@
 #include "wienertree/cubature/catalogue.hpp"
 #include "wienertree/cubature/construct.hpp"
 #include "wienertree/cubature/formula_file.hpp"
-#include "wienertree/model/error.hpp"
+#include "wienertree/numeric/error.hpp"
 
 namespace wienertree::python {
 namespace {

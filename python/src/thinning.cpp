@@ -1,4 +1,4 @@
-#include "wienertree/tree/thinning.hpp"
+#include "wienertree/thinning/thinning.hpp"
 
 #include "arrays.hpp"
 #include "bindings.hpp"

@@ -10,7 +10,7 @@
 
 #include <cstddef>
 
-#include "wienertree/model/batch.hpp"
+#include "wienertree/numeric/batch.hpp"
 
 namespace wienertree {
 

@@ -3,7 +3,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "wienertree/model/batch.hpp"
+#include "wienertree/numeric/batch.hpp"
 
 namespace wienertree {
 

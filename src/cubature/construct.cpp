@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "wienertree/cubature/verification.hpp"
-#include "wienertree/model/error.hpp"
+#include "wienertree/numeric/error.hpp"
 
 namespace wienertree {
 namespace {

@@ -4,7 +4,7 @@
 
 #include "wienertree/cubature/formula_keys.hpp"
 #include "wienertree/cubature/json_fields.hpp"
-#include "wienertree/model/error.hpp"
+#include "wienertree/numeric/error.hpp"
 
 namespace wienertree {
 namespace {

@@ -6,7 +6,7 @@
 #include <cmath>
 #include <vector>
 
-#include "wienertree/model/error.hpp"
+#include "wienertree/numeric/error.hpp"
 
 namespace wienertree {
 namespace {

@@ -9,7 +9,7 @@
 #include <system_error>
 #include <vector>
 
-#include "wienertree/model/error.hpp"
+#include "wienertree/numeric/error.hpp"
 
 namespace wienertree::json {
 namespace {

@@ -7,7 +7,7 @@
 #include <cmath>
 #include <map>
 
-#include "wienertree/model/error.hpp"
+#include "wienertree/numeric/error.hpp"
 
 namespace wienertree {
 namespace {

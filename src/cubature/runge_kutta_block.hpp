@@ -7,7 +7,7 @@
 #include "wienertree/cubature/runge_kutta_kernel.hpp"
 #include "wienertree/cubature/runge_kutta_pairs.hpp"
 #include "wienertree/cubature/segment_field.hpp"
-#include "wienertree/model/batch.hpp"
+#include "wienertree/numeric/batch.hpp"
 
 namespace wienertree {
 

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "wienertree/cubature/flow.hpp"
-#include "wienertree/model/batch.hpp"
+#include "wienertree/numeric/batch.hpp"
 #include "wienertree/model/model.hpp"
 
 namespace wienertree {

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <limits>
 
-#include "wienertree/model/error.hpp"
+#include "wienertree/numeric/error.hpp"
 
 namespace wienertree {
 namespace {

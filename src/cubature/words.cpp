@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cassert>
 
-#include "wienertree/model/error.hpp"
+#include "wienertree/numeric/error.hpp"
 
 namespace wienertree {
 

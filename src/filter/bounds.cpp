@@ -7,8 +7,8 @@
 #include <limits>
 
 #include "wienertree/filter/places.hpp"
-#include "wienertree/tree/clones.hpp"
-#include "wienertree/tree/lane_sum.hpp"
+#include "wienertree/numeric/clones.hpp"
+#include "wienertree/numeric/lane_sum.hpp"
 
 namespace wienertree {
 namespace {

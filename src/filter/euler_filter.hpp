@@ -5,7 +5,7 @@
 /// weighted by the same functionals as the KLV filter, and resampled by any counting `Thinning`, at every
 /// step or when the effective sample size falls below a fraction of N.
 #include "wienertree/filter/filter.hpp"
-#include "wienertree/tree/parallel.hpp"
+#include "wienertree/numeric/parallel.hpp"
 
 namespace wienertree {
 

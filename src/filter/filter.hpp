@@ -13,9 +13,9 @@
 #include "wienertree/filter/weights.hpp"
 #include "wienertree/filter/window.hpp"
 #include "wienertree/model/model.hpp"
-#include "wienertree/model/state_archive.hpp"
+#include "wienertree/numeric/state_archive.hpp"
 #include "wienertree/tree/generation.hpp"
-#include "wienertree/tree/thinning.hpp"
+#include "wienertree/thinning/thinning.hpp"
 
 namespace wienertree {
 

@@ -4,7 +4,7 @@
 #include <string_view>
 
 #include "wienertree/filter/window.hpp"
-#include "wienertree/model/batch.hpp"
+#include "wienertree/numeric/batch.hpp"
 
 namespace wienertree {
 

@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "wienertree/cubature/gaussian_cubature.hpp"
-#include "wienertree/model/batch.hpp"
+#include "wienertree/numeric/batch.hpp"
 #include "wienertree/model/model.hpp"
 
 namespace wienertree {

@@ -16,7 +16,7 @@
 #include "wienertree/cubature/gaussian_cubature.hpp"
 #include "wienertree/filter/filter.hpp"
 #include "wienertree/filter/gaussian_conditioning.hpp"
-#include "wienertree/tree/parallel.hpp"
+#include "wienertree/numeric/parallel.hpp"
 
 namespace wienertree {
 

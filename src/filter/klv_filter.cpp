@@ -10,7 +10,7 @@
 
 #include "wienertree/filter/places.hpp"
 #include "wienertree/tree/initial.hpp"
-#include "wienertree/tree/log_weights.hpp"
+#include "wienertree/numeric/log_weights.hpp"
 #include "wienertree/tree/tree_size.hpp"
 
 namespace wienertree {

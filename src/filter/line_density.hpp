@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "wienertree/filter/fokker_planck.hpp"
-#include "wienertree/model/state_archive.hpp"
+#include "wienertree/numeric/state_archive.hpp"
 
 namespace wienertree {
 

@@ -7,8 +7,8 @@
 #include <cstdint>
 #include <numbers>
 
-#include "wienertree/tree/clones.hpp"
-#include "wienertree/tree/lane_sum.hpp"
+#include "wienertree/numeric/clones.hpp"
+#include "wienertree/numeric/lane_sum.hpp"
 
 namespace wienertree {
 namespace {

@@ -5,9 +5,9 @@
 #include <cmath>
 
 #include "wienertree/filter/marginal.hpp"
-#include "wienertree/tree/clones.hpp"
-#include "wienertree/tree/lane_sum.hpp"
-#include "wienertree/tree/log_weights.hpp"
+#include "wienertree/numeric/clones.hpp"
+#include "wienertree/numeric/lane_sum.hpp"
+#include "wienertree/numeric/log_weights.hpp"
 
 namespace wienertree {
 namespace {

@@ -4,8 +4,8 @@
 #include <span>
 #include <vector>
 
-#include "wienertree/model/batch.hpp"
-#include "wienertree/model/state_archive.hpp"
+#include "wienertree/numeric/batch.hpp"
+#include "wienertree/numeric/state_archive.hpp"
 
 namespace wienertree {
 

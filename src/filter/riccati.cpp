@@ -9,7 +9,7 @@
 #include <cmath>
 #include <type_traits>
 
-#include "wienertree/model/error.hpp"
+#include "wienertree/numeric/error.hpp"
 
 namespace wienertree {
 namespace {

@@ -1,8 +1,8 @@
 // Compiled with -ffp-contract=off: every instruction set returns the same bits.
 #include "wienertree/filter/row_integrals.hpp"
 
-#include "wienertree/tree/clones.hpp"
-#include "wienertree/tree/lane_sum.hpp"
+#include "wienertree/numeric/clones.hpp"
+#include "wienertree/numeric/lane_sum.hpp"
 
 namespace wienertree {
 namespace {

@@ -7,7 +7,7 @@
 #include <limits>
 
 #include "wienertree/tree/initial.hpp"
-#include "wienertree/tree/random.hpp"
+#include "wienertree/numeric/random.hpp"
 
 namespace wienertree {
 namespace {

@@ -8,8 +8,8 @@
 #include <string>
 
 #include "wienertree/filter/places.hpp"
-#include "wienertree/model/error.hpp"
-#include "wienertree/tree/log_weights.hpp"
+#include "wienertree/numeric/error.hpp"
+#include "wienertree/numeric/log_weights.hpp"
 
 namespace wienertree {
 namespace {

@@ -4,7 +4,7 @@
 #include <span>
 #include <vector>
 
-#include "wienertree/model/batch.hpp"
+#include "wienertree/numeric/batch.hpp"
 
 namespace wienertree {
 

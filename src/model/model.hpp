@@ -10,7 +10,7 @@
 #include <utility>
 #include <vector>
 
-#include "wienertree/model/error.hpp"
+#include "wienertree/numeric/error.hpp"
 #include "wienertree/model/vector_fields.hpp"
 
 namespace wienertree {

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <limits>
 
-#include "wienertree/model/error.hpp"
+#include "wienertree/numeric/error.hpp"
 #include "wienertree/study/error_measure.hpp"
 
 namespace wienertree {

@@ -9,7 +9,7 @@
 #include <ranges>
 #include <unordered_map>
 
-#include "wienertree/model/error.hpp"
+#include "wienertree/numeric/error.hpp"
 #include "wienertree/tree/genealogy_graph.hpp"
 
 namespace wienertree {

@@ -2,8 +2,8 @@
 /// One generation of the tree: a weighted measure on nodes at one time, as a structure of arrays.
 #include <cstdint>
 
-#include "wienertree/model/batch.hpp"
-#include "wienertree/model/state_archive.hpp"
+#include "wienertree/numeric/batch.hpp"
+#include "wienertree/numeric/state_archive.hpp"
 
 namespace wienertree {
 

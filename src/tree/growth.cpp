@@ -8,8 +8,8 @@
 #include <limits>
 #include <mutex>
 
-#include "wienertree/model/buffer.hpp"
-#include "wienertree/model/error.hpp"
+#include "wienertree/numeric/buffer.hpp"
+#include "wienertree/numeric/error.hpp"
 
 namespace wienertree {
 namespace {

@@ -8,8 +8,8 @@
 #include "wienertree/cubature/flow.hpp"
 #include "wienertree/cubature/formula.hpp"
 #include "wienertree/tree/generation.hpp"
-#include "wienertree/tree/parallel.hpp"
-#include "wienertree/tree/thinning.hpp"
+#include "wienertree/numeric/parallel.hpp"
+#include "wienertree/thinning/thinning.hpp"
 
 namespace wienertree {
 

@@ -2,7 +2,7 @@
 /// The first generation of a tree.
 #include "wienertree/model/model.hpp"
 #include "wienertree/tree/generation.hpp"
-#include "wienertree/tree/random.hpp"
+#include "wienertree/numeric/random.hpp"
 
 namespace wienertree {
 

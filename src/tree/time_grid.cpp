@@ -4,7 +4,7 @@
 
 #include <cmath>
 
-#include "wienertree/model/error.hpp"
+#include "wienertree/numeric/error.hpp"
 
 namespace wienertree {
 

@@ -6,7 +6,7 @@
 
 #include "wienertree/cubature/formula_file.hpp"
 #include "wienertree/cubature/verification.hpp"
-#include "wienertree/model/error.hpp"
+#include "wienertree/numeric/error.hpp"
 
 using namespace wienertree;
 

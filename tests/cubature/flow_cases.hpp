@@ -6,7 +6,7 @@
 
 #include "cubature/test_models.hpp"
 #include "wienertree/cubature/flow.hpp"
-#include "wienertree/model/batch.hpp"
+#include "wienertree/numeric/batch.hpp"
 
 namespace wienertree::test {
 

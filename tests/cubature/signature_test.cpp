@@ -7,7 +7,7 @@
 #include <random>
 
 #include "cubature/random_path.hpp"
-#include "wienertree/model/error.hpp"
+#include "wienertree/numeric/error.hpp"
 
 using namespace wienertree;
 using wienertree::testing::random_path;

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "wienertree/tree/random.hpp"
+#include "wienertree/numeric/random.hpp"
 
 using namespace wienertree;
 

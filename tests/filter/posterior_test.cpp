@@ -7,7 +7,7 @@
 
 #include "wienertree/filter/marginal.hpp"
 
-#include "wienertree/tree/random.hpp"
+#include "wienertree/numeric/random.hpp"
 
 using namespace wienertree;
 

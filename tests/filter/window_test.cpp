@@ -3,7 +3,7 @@
 #include <catch2/catch.hpp>
 #include <cmath>
 
-#include "wienertree/tree/random.hpp"
+#include "wienertree/numeric/random.hpp"
 
 using namespace wienertree;
 

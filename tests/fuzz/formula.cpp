@@ -6,7 +6,7 @@
 
 #include "wienertree/cubature/formula_file.hpp"
 #include "wienertree/cubature/lie_formula_file.hpp"
-#include "wienertree/model/error.hpp"
+#include "wienertree/numeric/error.hpp"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* bytes, std::size_t size) {
   using namespace wienertree;

@@ -9,8 +9,8 @@
 
 #include "wienertree/cubature/catalogue.hpp"
 #include "wienertree/model/text_model.hpp"
-#include "wienertree/tree/weak_control.hpp"
-#include "wienertree/tree/weak_smoothing.hpp"
+#include "wienertree/weak/control.hpp"
+#include "wienertree/weak/smoothing.hpp"
 
 namespace wienertree_test {
 

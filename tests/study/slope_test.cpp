@@ -5,7 +5,7 @@
 #include <random>
 #include <vector>
 
-#include "wienertree/model/error.hpp"
+#include "wienertree/numeric/error.hpp"
 
 using namespace wienertree;
 

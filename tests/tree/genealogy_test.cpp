@@ -11,10 +11,10 @@
 #include <set>
 #include <sstream>
 
-#include "wienertree/model/error.hpp"
+#include "wienertree/numeric/error.hpp"
 #include "wienertree/tree/genealogy_graph.hpp"
 #include "wienertree/tree/growth.hpp"
-#include "wienertree/tree/thinning.hpp"
+#include "wienertree/thinning/thinning.hpp"
 
 using namespace wienertree;
 

@@ -7,7 +7,7 @@
 #include <cmath>
 
 #include "allocations.hpp"
-#include "wienertree/model/error.hpp"
+#include "wienertree/numeric/error.hpp"
 
 using namespace wienertree;
 

@@ -5,7 +5,7 @@
 #include <string_view>
 #include <vector>
 
-#include "wienertree/model/error.hpp"
+#include "wienertree/numeric/error.hpp"
 
 namespace wienertree::text {
 

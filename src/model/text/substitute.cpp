@@ -5,7 +5,7 @@
 #include <numbers>
 #include <unordered_map>
 
-#include "wienertree/model/error.hpp"
+#include "wienertree/numeric/error.hpp"
 #include "wienertree/model/text/expression.hpp"
 
 namespace wienertree::text {

@@ -1,0 +1,42 @@
+#pragma once
+/// A weak approximation as it is asked for: a number of steps, launches to be averaged, Richardson's
+/// extrapolation.
+#include <cstdint>
+#include <vector>
+
+#include "wienertree/weak/weak_approximation.hpp"
+
+namespace wienertree {
+
+struct WeakRun {
+  WeakOptions options;  ///< grid and launch are filled in
+  GridKind grid = GridKind::uniform;
+  double horizon = 1;                            ///< T
+  std::size_t steps = 10;                        ///< n
+  double gamma = 1;                              ///< of Kusuoka's grid
+  std::uint32_t launches = 1, first_launch = 0;  ///< launches from first_launch on
+  /// Also from ceil(n/2) steps, and the two extrapolated.
+  bool richardson = false;
+};
+
+/// Per payoff. Standard errors are those of the average of the launches, 0 where nothing is random.
+struct WeakResult {
+  std::vector<double> value, standard_error;
+  /// Empty unless asked for:  V_n + (V_n - V_k) / ((n/k)^q - 1),  k = ceil(n/2),  which takes the leading
+  /// term C n^{-q}, q = (m-1)/2, from the error of degree m (Talay, Tubaro 1990; Kusuoka 2001).
+  std::vector<double> extrapolated, extrapolated_standard_error;
+  std::size_t leaves = 0;        ///< of the last launch with n steps
+  std::uint64_t ode_solves = 0;  ///< of all trees
+  double discarded = 0;          ///< of the tree with n steps: see WeakEstimate
+};
+
+/// @throws InputError as weak_approximation; if launches or n are 0, or n < 2 with richardson
+WeakResult run_weak(const Model& model, const std::vector<BatchFunction>& payoffs, const WeakRun& run);
+
+/// Whether the seed changes the result.
+bool is_random(const WeakOptions& options);
+
+/// From V_k and V_n, k < n, as above.
+double extrapolate(double coarse, double fine, std::size_t k, std::size_t n, int degree);
+
+}  // namespace wienertree

@@ -1,0 +1,69 @@
+#pragma once
+/// E[f(X_T)] by the iterated KLV operator: the tree of a cubature formula grown along a time grid, thinned or
+/// not, and the payoffs averaged over its leaves (Kusuoka 2001; Lyons, Victoir 2004; Litterer, Lyons 2012 for
+/// the thinned tree; Ninomiya 2003, "A partial sampling method applied to the Kusuoka approximation", for the
+/// tree sampled by TBBA).
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <vector>
+
+#include "wienertree/cubature/flow.hpp"
+#include "wienertree/cubature/formula.hpp"
+#include "wienertree/model/batch_function.hpp"
+#include "wienertree/model/model.hpp"
+#include "wienertree/tree/generation.hpp"
+#include "wienertree/thinning/thinning.hpp"
+#include "wienertree/tree/time_grid.hpp"
+
+namespace wienertree {
+
+class WeakJournal;
+
+struct WeakOptions {
+  CubatureFormula formula;   ///< dimension p of the model
+  std::vector<double> grid;  ///< from time_grid
+  std::size_t nodes = 1000;  ///< N, the budget of the thinning; `none` has no use for it
+  ThinningOptions thinning = {ThinningMethod::recombination, SiteOrder::spatial, 0};
+  /// What the payoffs bend along, the argument of a kink, say; may be empty. In two dimensions and more
+  /// recombination is then finest along its value at T on the path without noise (slabs.hpp).
+  BatchFunction finest_along = {};
+  FlowMethod flow = FlowMethod::automatic;
+  FlowTolerance tolerance;
+  std::uint64_t seed = 1;
+  std::uint32_t launch = 0;
+  unsigned threads = 1;
+  /// A component that is int r dt along the path: values are those of exp(-int_0^T r dt) f(X_T). After each
+  /// step exp(-x) becomes part of the node's weight and x starts again from 0, so that thinning sees the
+  /// discounted measure (Feynman-Kac) and no further dimension.
+  std::optional<std::size_t> discount_state = {};
+  double memory_limit = 4.0e9;  ///< bytes; a tree over it is refused before it starts
+  /// Called after each step with its number, from 1; may be empty. What it throws ends the computation.
+  std::function<void(std::size_t step)> observe = {};
+  /// Where the trees of the computation are recorded, to be put down and taken up; may be null.
+  WeakJournal* journal = nullptr;
+};
+
+struct WeakEstimate {
+  std::vector<double> value;     ///< one for each payoff
+  std::size_t leaves = 0;        ///< nodes at T that the values are averaged over
+  std::uint64_t ode_solves = 0;  ///< node-segments moved
+  double discarded = 0;          ///< sum over the steps of Selection::discarded
+};
+
+void exchange(StateArchive& archive, WeakEstimate& estimate);
+
+/// One tree, many payoffs. The law of the start is that of the model; `start` is its first generation.
+///
+/// While a step has at most N children they are all kept. Beyond that, a random thinning in tree order looks
+/// at weights alone: it chooses among the children before any is moved, so that a step costs N moves. All
+/// others look at states: a step costs N c moves, c the paths of the formula, and the children of the last
+/// step are averaged over as they are.
+/// @param payoffs functions of the d states, each with one value a node
+/// @throws InputError if an option does not fit the model, or the tree exceeds the memory limit, with its
+/// size and the options that avoid it; RunError naming step, time, node and state when a node cannot be
+/// moved, and naming the payoff when its average is not finite
+WeakEstimate weak_approximation(const Model& model, const Generation& start,
+                                const std::vector<BatchFunction>& payoffs, const WeakOptions& options);
+
+}  // namespace wienertree
