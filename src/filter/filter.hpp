@@ -10,6 +10,7 @@
 #include "wienertree/cubature/formula.hpp"
 #include "wienertree/filter/functional.hpp"
 #include "wienertree/filter/posterior.hpp"
+#include "wienertree/filter/warning.hpp"
 #include "wienertree/filter/weights.hpp"
 #include "wienertree/filter/window.hpp"
 #include "wienertree/model/model.hpp"
@@ -57,6 +58,8 @@ class Filter {
   /// For filters that keep likelihood ratios, else nothing.
   virtual std::optional<LikelihoodRatio> likelihood_ratio() { return {}; }
   const FilterStatistics& statistics() const { return statistics_; }
+  /// What it has seen since its start that makes its answer doubtful, one entry for each kind.
+  const std::vector<FilterWarning>& warnings() const { return warnings_; }
   /// Writes or reads all that later steps depend on. A filter that was made with the same arguments (but for
   /// the number of threads) and has read what another wrote goes on with the same bytes; its posterior is
   /// defined from its next step on.
@@ -66,6 +69,7 @@ class Filter {
  protected:
   virtual void exchange_state(StateArchive& archive) = 0;
   FilterStatistics statistics_;
+  std::vector<FilterWarning> warnings_;
 };
 
 enum class FilterMethod {
@@ -89,6 +93,14 @@ enum class PruneWeights {
 
 enum class OnNodeFailure { stop, drop };
 
+/// How the KLV filter takes in a discrete observation. With `families` and `components` a window is the whole gap
+/// before the observation, and the filter chooses its substeps.
+enum class Conditioning {
+  children,    ///< every child is weighed by the density at its place
+  families,    ///< d = 1: the law of a node's children over the last substep is conditioned
+  components,  ///< nodes are Gaussians with covariances, moved by their moment equations and conditioned
+};
+
 struct FilterOptions {
   FilterMethod method = FilterMethod::klv;
   CubatureFormula formula;   ///< tree methods: dimension p of the model
@@ -96,6 +108,10 @@ struct FilterOptions {
   ThinningOptions thinning;
   PruneWeights prune_weights = PruneWeights::likelihood;
   FunctionalMethod functional = FunctionalMethod::second_order;
+  Conditioning conditioning = Conditioning::children;
+  /// Families and components: how far from Gaussian (skewness, excess kurtosis; in d > 1 the non-affine part of the
+  /// drift in standard deviations of a family) the law of a family may be over the last substep before an observation.
+  double substep_tolerance = 0.1;
   /// A likelihood of the caller's in place of `functional`; made once for each filter.
   std::function<std::unique_ptr<Functional>()> own_functional = {};
   /// Random thinning lets likelihoods decide when their effective sample size is at most this fraction F of
