@@ -1,13 +1,12 @@
 /// Accuracy for the money. For every method the root mean square error of the posterior mean at T against the
-/// exact filter, over observation paths and components, and the processor time of one run, all in one
-/// process:
+/// exact filter, over observation paths and components, and the processor time of one run, all in one process:
 ///   B           Benes, mu 0.5, sigma 0.8, h1 0.4, x0 1, T 10; 10 paths
 ///   C           Benes, mu 0.05, sigma 1, h1 0.8, x0 0, T 20; 10 paths
 ///   linear-3d   the bundled model, d = 3, p = k = 2, T 5; 4 paths; against Kalman-Bucy
 /// and the ratio of processor times at matched error (4e-3) between the Euler particle filter and the tree.
 ///
-///     build/bench/bench/accuracy_per_second [TABLE.csv]            (about three minutes; bench/draw-accuracy
-///     draws the table)
+///     build/bench/bench/accuracy_per_second [TABLE.csv]            (about three minutes)
+///     bench/draw-accuracy TABLE.csv PICTURE.svg
 #include <fmt/format.h>
 
 #include <cmath>

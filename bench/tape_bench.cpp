@@ -47,8 +47,7 @@ Tape tanh_and_derivative() {
   return t.finish(outputs);
 }
 
-/// sum_k V_k D_k of Heston's model in Stratonovich form, with r, kappa, theta, xi, rho, D_0, D_1, D_2
-/// uniform:
+/// sum_k V_k D_k of Heston's model in Stratonovich form, with r, kappa, theta, xi, rho, D_0, D_1, D_2 uniform:
 ///   ds = (r - v/2 - rho xi/4) s dt + sqrt(v) s o dB^1
 ///   dv = (kappa (theta - v) - xi^2/4) dt + xi sqrt(v) o (rho dB^1 + sqrt(1 - rho^2) dB^2)
 Tape heston() {

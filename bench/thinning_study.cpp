@@ -1,7 +1,6 @@
 /// The strategies of thinning on the same trees: error against N and against processor time, d = 1, 2, 3.
 ///
-///     build/bench/bench/thinning_study DIRECTORY        (about two minutes; bench/draw-thinning draws the
-///     table)
+///     build/bench/bench/thinning_study DIRECTORY      (about two minutes; bench/draw-thinning draws the table)
 ///
 /// writes thinning.csv there. Filtering problems with T 5 in 20 steps, degree 5, second-order: Benes with mu
 /// 0.05, sigma 1, h1 0.8 (d = 1), a noisy pendulum whose horizontal position is observed (d = 2, not linear),

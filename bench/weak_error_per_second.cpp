@@ -1,5 +1,5 @@
-/// Weak approximation: error against processor time, in one run. A European call in Heston's model (S0 = K =
-/// 100, r 0, kappa 2, theta = v0 = 0.04, xi 0.3, rho -0.7, T 1), exact 7.6157469179.
+/// Weak approximation: error against processor time, in one run. A European call in Heston's model
+/// (S0 = K = 100, r 0, kappa 2, theta = v0 = 0.04, xi 0.3, rho -0.7, T 1), exact 7.6157469179.
 ///
 ///     build/bench/bench/weak_error_per_second [TABLE.csv]         (about two minutes)
 ///     bench/draw-weak-error TABLE.csv PICTURE.svg

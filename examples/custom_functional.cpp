@@ -1,6 +1,6 @@
-/// A functional of one's own: the likelihood of a step by the midpoint of its ends, log w = h_m.D - s |h_m|^2
-/// / 2 with h_m = (h_0 + h_1)/2. Its error in the number of steps, beside the ones that come with the
-/// library.
+/// A functional of one's own: the likelihood of a step by the midpoint of its ends,
+///     log w = h_m.D - (s/2) |h_m|^2,     h_m = (h_0 + h_1)/2.
+/// Its error in the number of steps is printed beside that of the functionals that come with the library.
 ///
 ///     custom_functional
 #include <algorithm>

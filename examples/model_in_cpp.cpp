@@ -1,5 +1,5 @@
-/// A model in C++, filtered: a particle in the double well dX = (X - X^3) dt + s dB, observed through dY = X
-/// dt + dW.
+/// A model in C++, filtered: a particle in the double well dX = (X - X^3) dt + s dB, observed through
+/// dY = X dt + dW.
 ///
 ///     model_in_cpp            the posterior at ten times, beside the signal
 #include <cmath>

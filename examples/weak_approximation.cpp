@@ -1,4 +1,4 @@
-/// E[f(X_T)] without a file: moments of geometric Brownian motion by 2 .. 16 steps of degree 5, and
+/// Weak approximation, E[f(X_T)]: moments of geometric Brownian motion by 2 .. 16 steps of degree 5, and
 /// extrapolated.
 ///
 ///     weak_approximation

@@ -9,9 +9,9 @@
 namespace wienertree {
 namespace {
 
-/// CVODE keeps the error of a step below its tolerance. Its steps a segment are some tens, and their errors
-/// add up; a tenth of the tolerance keeps the error of the segment below the tolerance (the tests measure
-/// it).
+/// CVODE keeps the error of one of its steps below its tolerance. A segment takes some tens of steps, whose
+/// errors add up: a hundredth of the tolerance keeps the error of the segment below the tolerance (the tests
+/// measure it).
 constexpr double share_of_tolerance = 0.01;
 constexpr long max_steps = 20000;
 /// A solution that leaves every bound at some u < 1 makes steps shrink for ever.

@@ -22,8 +22,9 @@ BenesFilter::BenesFilter(const Model& model) : observed_(model.observation != Ob
   m_ = p_.x0;
 }
 
-// One gap of length delta between rows, Y linear on it. The driftless filter is dm = h1 P (dY - (h1 m + h2)
-// dt) with h1^2 P = c tanh(c t), so (m cosh(c t))' = sigma sinh(c t) (Y' - h2):
+// One gap of length delta between rows, Y linear on it. The driftless filter is
+//     dm = h1 P (dY - (h1 m + h2) dt),   h1^2 P = c tanh(c t),
+// so that (m cosh(c t))' = sigma sinh(c t) (Y' - h2) and
 //     m_1 = m_0 cosh(c t0)/cosh(c t1) + (Y' - h2) (sigma/c) (1 - cosh(c t0)/cosh(c t1)).
 // Evidence: int (h1 m + h2) dY - 1/2 int (h1 m + h2)^2 dt, the first as a Stratonovich integral less its Ito
 // correction 1/2 h1^2 int P dt = 1/2 log(cosh(c t1)/cosh(c t0)); m is a cosh-weighted mean of two constants

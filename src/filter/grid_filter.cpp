@@ -16,8 +16,8 @@ constexpr double rounding = 1e-15, tolerated = 1e-5;
 // The change of log density over a cell at which differences of order 8 still have four digits.
 constexpr double roughest = 0.5;
 // A point mass is spread in eight equal steps on one grid of 27 standard deviations, during which the mean
-// moves by at most one. The shortest waves shrink in each by the rational exponential's 7/z at z = sigma^2 s
-// (pi/width)^2/2, about 100 with 100 points and 1600 with 400.
+// moves by at most one. The shortest waves shrink in each by the rational exponential's 7/z at
+// z = sigma^2 s (pi/width)^2/2, about 100 with 100 points and 1600 with 400.
 constexpr int point_steps = 8, fewest_point_halvings = 7;
 constexpr int most_halvings = 40, most_repetitions = 20;
 constexpr std::size_t fewest_points = 32;

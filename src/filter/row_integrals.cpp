@@ -33,8 +33,8 @@ WIENERTREE_INLINE void sum_gaps(std::size_t gaps, Add add, double (&total)[K]) {
     for (std::size_t lane = 0; lane < sum_lanes; ++lane) total[k] += in_lanes[k][lane];
 }
 
-// On a gap [u, v] of length delta with U = p, q at its ends: delta/2 (p + q), delta/6 (p (2u + v) + q (u +
-// 2v)), delta/12 (p (3u^2 + 2uv + v^2) + q (u^2 + 2uv + 3v^2)).
+// On a gap [u, v] of length delta with U = p, q at its ends: delta/2 (p + q),
+// delta/6 (p (2u + v) + q (u + 2v)), delta/12 (p (3u^2 + 2uv + v^2) + q (u^2 + 2uv + 3v^2)).
 WIENERTREE_INLINE RowIntegrals integrals(const double* t, const double* y, std::size_t stride,
                                          std::size_t gaps) {
   const double start = t[0], last = y[gaps * stride];

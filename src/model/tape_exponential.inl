@@ -7,8 +7,8 @@
 //   exp(x) = 2^n e^r,     e^r = 1 + r + r^2 q(r),     q(r) = sum_{k=0..11} r^k / (k+2)!
 //
 // whose remainder is below r^14/14! < 2^-56 |r| (W. J. Cody, W. Waite 1980, Software Manual for the
-// Elementary Functions, chapter 6). For tanh, with a = |x|, n nearest to 2a/ln 2, r = a - n ln(2)/2 and S =
-// 2^n,
+// Elementary Functions, chapter 6). For tanh, with a = |x|, n nearest to 2a/ln 2, r = a - n ln(2)/2 and
+// S = 2^n,
 //
 //   exp(2a) = S exp(2r) = S (C + r)/(C - r),     C = r coth r = 1 + r^2/3 - r^4/45 + ..
 //   tanh(a) = (exp(2a) - 1)/(exp(2a) + 1) = ((S - 1) C + (S + 1) r)/((S + 1) C + (S - 1) r)

@@ -4,9 +4,10 @@
 //   struct Machine {
 //     using Vector = ..;                         // `width` doubles
 //     static constexpr size_t width = ..;
-//     static Vector load(const double*);  static void store(double*, Vector);  static Vector
-//     broadcast(double); static Vector add(Vector, Vector);  ..     // every operation of tape_kernel.hpp, by
-//     its name
+//     static Vector load(const double*);
+//     static void store(double*, Vector);
+//     static Vector broadcast(double);
+//     static Vector add(Vector, Vector);  ..     // every operation of tape_kernel.hpp, by its name
 //   };
 //
 // Everything here has internal linkage: the same template instantiated under two instruction sets must stay

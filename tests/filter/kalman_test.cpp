@@ -175,8 +175,8 @@ TEST_CASE("Kalman filter: a vague prior of variance 1e14 leaves the posterior of
   ObservationPath path{1, {0.0}, {2.0}};
   KalmanFilter filter(model);
   run(filter, ObservationWindows(path, model.observation, model.timing, 0), {});
-  // P_1 = 1/(1/0.25 + 1e-14); I - K h is 1 - K = 2.5e-15, itself a difference of numbers of size 1, but K R K
-  // is not.
+  // P_1 = 1/(1/0.25 + 1e-14); I - K h is 1 - K = 2.5e-15, itself a difference of numbers of size 1, but
+  // K R K is not.
   CHECK(mean(filter.posterior(), 0) == Approx(2.0));
   CHECK(covariance(filter.posterior(), 0, 0) == Approx(0.25).epsilon(1e-12));
 }

@@ -118,8 +118,8 @@ TEST_CASE("Kalman-Bucy filter: without drift it is Benes' filter with mu = 0") {
   const Posterior p = filtered(filter, model, path, 0), q = filtered(benes, model, path, 0);
   CHECK(mean(p, 0) == Approx(mean(q, 0)).epsilon(0).margin(1e-10));
   CHECK(covariance(p, 0, 0) == Approx(covariance(q, 0, 0)).epsilon(1e-10));
-  // Benes' evidence by Simpson's rule: (c gap)^5/2880 of |Y'|^2 a gap, (0.48 * 0.01)^4 * 0.01 * 5e4/2880 =
-  // 1e-10.
+  // Benes' evidence by Simpson's rule: (c gap)^5/2880 of |Y'|^2 a gap,
+  // (0.48 * 0.01)^4 * 0.01 * 5e4/2880 = 1e-10.
   CHECK(p.log_evidence == Approx(q.log_evidence).epsilon(0).margin(1e-9));
 }
 

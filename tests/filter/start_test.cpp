@@ -39,8 +39,8 @@ TEST_CASE("a Gaussian start has mass one, its mean and its covariance, also when
     const Generation g = first_generation(with_initial_law(mean, L * L.transpose()), nodes);
     CHECK(g.size() <= std::max<std::size_t>(nodes, 1000));
     CHECK(log_mass(g) == Approx(0).epsilon(0).margin(1e-13));
-    // 400 nodes on rank 2: 20 an axis, spacing 0.63, error of the trapezoidal rule exp(-2 pi^2/0.63^2) <
-    // 1e-21, beyond 6 sd 1e-7.
+    // 400 nodes on rank 2: 20 an axis, spacing 0.63, error of the trapezoidal rule
+    // exp(-2 pi^2/0.63^2) < 1e-21, beyond 6 sd 1e-7.
     Eigen::Vector3d m = Eigen::Vector3d::Zero();
     Eigen::Matrix3d second = Eigen::Matrix3d::Zero();
     for (std::size_t n = 0; n < g.size(); ++n) {

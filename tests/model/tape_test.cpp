@@ -175,9 +175,9 @@ constexpr double inf = std::numeric_limits<double>::infinity();
 /// A value of a random expression at every node, evaluated plainly, with a bound of the error of any
 /// evaluation.
 ///
-/// Running error analysis (Higham 2002, Accuracy and Stability of Numerical Algorithms, section 3.3): if z =
-/// f(a, b) is computed from operands in error by at most e_a, e_b with relative rounding error k u, u =
-/// 2^-53, then to first order
+/// Running error analysis (Higham 2002, Accuracy and Stability of Numerical Algorithms, section 3.3): if
+/// z = f(a, b) is computed from operands in error by at most e_a, e_b with relative rounding error k u,
+/// u = 2^-53, then to first order
 ///
 ///     e_z = |df/da| e_a + |df/db| e_b + k u |z|
 ///

@@ -1,5 +1,5 @@
-/// Error against the number of steps (problem B): Benes, mu 0.5, sigma 0.8, h1 0.4, h2 0, x0 1, T 10, phi(x)
-/// = x. Source of truth: the exact Benes filter on 12 simulated observation paths. Published: Crisan,
+/// Error against the number of steps (problem B): Benes, mu 0.5, sigma 0.8, h1 0.4, h2 0, x0 1, T 10,
+/// phi(x) = x. Source of truth: the exact Benes filter on 12 simulated observation paths. Published: Crisan,
 /// Ortiz-Latorre (2013) find slope -1 for Picard's functional. Ours: -1 for `picard`, -2 for `second-order`.
 /// Criterion: fitted slope in [-1.2, -0.8] for picard, at most -1.8 for second-order, degree 5.
 #include <fmt/format.h>

@@ -275,8 +275,8 @@ TEST_CASE("euler: evidence is unbiased without resampling") {
 TEST_CASE("gaussian-mixture: evidence is unbiased for the Euler chain's") {
   for (const Problem& p : {discrete_linear(), continuous_linear(), benes(), nile(30)})
     check_mixture(p, FunctionalMethod::picard, {0.0, 0.13, 0.5});
-  // The end of a step is weighed at the Gaussian's mean: a bias of order alpha s, not seen at alpha =
-  // N^{-1/2} = 0.13.
+  // The end of a step is weighed at the Gaussian's mean: a bias of order alpha s, not seen at
+  // alpha = N^{-1/2} = 0.13.
   for (const Problem& p : {continuous_linear(), benes()})
     check_mixture(p, FunctionalMethod::second_order, {0.0, 0.13});
 }

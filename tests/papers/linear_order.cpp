@@ -1,10 +1,12 @@
 // Order of convergence of every formula on linear SDEs.
 //
 // Claim (Kusuoka 2001; Lyons, Victoir 2004): n steps of a formula of degree m leave an error O(n^{-(m-1)/2}).
-// Problem: dX = A_0 X dt + sum_i A_i X o dB^i on R^4, A_i random and not commuting. Then E X_1 = exp(A_0 +
-// 1/2 sum_i A_i^2) X_0 exactly, and a step of length s is the matrix K_s = sum_j lambda_j prod_segments
-// exp(sum_k D_k A_k), so that the error |K_{1/n}^n - exp(..)| / |exp(..)| (Frobenius norms) is computed
-// without any other approximation.
+// Problem: dX = A_0 X dt + sum_i A_i X o dB^i on R^4, A_i random and not commuting. Then
+//     E X_1 = exp(A_0 + 1/2 sum_i A_i^2) X_0
+// exactly, and a step of length s is the matrix
+//     K_s = sum_j lambda_j prod_segments exp(sum_k D_k A_k),
+// so that the error |K_{1/n}^n - exp(..)| / |exp(..)| (Frobenius norms) is computed without any other
+// approximation.
 //
 // Entries of the A_i are Gaussian, each A_i scaled to Frobenius norm 1; errors are root mean squares over 8
 // draws, so that a chance cancellation in one draw does not show as order. The order is the least-squares
@@ -58,8 +60,8 @@ Matrix step_matrix(const CubatureFormula& formula, const std::vector<Matrix>& A,
   return K;
 }
 
-// The bracket of the linear fields x -> A x, x -> B x is the linear field of (DV_B) V_A - (DV_A) V_B = BA -
-// AB.
+// The bracket of the linear fields x -> A x, x -> B x is the linear field of
+// (DV_B) V_A - (DV_A) V_B = BA - AB.
 Matrix field_of(const LieBracket& bracket, const std::vector<Matrix>& A) {
   if (bracket.is_letter()) return A[static_cast<std::size_t>(bracket.letter())];
   const Matrix left = field_of(bracket.left(), A), right = field_of(bracket.right(), A);

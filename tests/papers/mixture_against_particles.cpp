@@ -3,8 +3,8 @@
 /// model with mu 0.3, sigma 1, h1 0.8, T 10, 100 steps, a correction at each; relative errors of E[x^2] and
 /// E[x^3] at T against the exact filter, root mean square over launches.
 ///
-/// What we find: with the same branching (TBBA) the two cannot be told apart for any N; the mixture with beta
-/// = 1 loses by the variance it adds, and multinomial branching costs a factor of 2 to 4 in mean square,
+/// What we find: with the same branching (TBBA) the two cannot be told apart for any N; the mixture with
+/// beta = 1 loses by the variance it adds, and multinomial branching costs a factor of 2 to 4 in mean square,
 /// which a comparison of filters that branch differently would take for a property of the filters.
 ///
 /// The ratio of two mean squares has the standard error that the delta method gives from the launches'

@@ -2,9 +2,9 @@
 /// State Space Methods, section 2.2), from a vague start N(0, 10^7). Source of truth: the Kalman filter,
 /// log-likelihood -641.585578, mean 798.36911 and variance 4032.08089 in 1970. Criterion: the exact filter to
 /// all digits given; KLV with recombination, degree 7, one step a year, to 1e-3 in log-evidence and 0.05 in
-/// the mean, whose standard deviation is 63.5; random methods within their own error: with M launches, |t| <
-/// 9 for t = (mean - truth)/(sd/sqrt(M)). Under the null hypothesis t is Student's with M - 1 = 29 degrees of
-/// freedom, |t| > 9 has probability 7e-10, and there are 2 tests of each of 7 methods.
+/// the mean, whose standard deviation is 63.5; random methods within their own error: with M launches,
+/// |t| < 9 for t = (mean - truth)/(sd/sqrt(M)). Under the null hypothesis t is Student's with M - 1 = 29
+/// degrees of freedom, |t| > 9 has probability 7e-10, and there are 2 tests of each of 7 methods.
 #include <fmt/format.h>
 
 #include <catch2/catch.hpp>

@@ -54,9 +54,9 @@ FilterOptions tree(const Model& model, ThinningMethod method, std::size_t nodes)
 }
 
 // The relative error of a standard deviation from M launches is (2(M-1))^{-1/2}, and that of the slope
-// through four values of N, log N having a standard deviation of 1.23 over them, (2(M-1))^{-1/2} / (2
-// * 1.23): 0.04 for M = 60, 0.08 for M = 15. Seeds are fixed, and results the same on every machine: no alarm
-// is by chance.
+// through four values of N, log N having a standard deviation of 1.23 over them,
+// (2(M-1))^{-1/2} / (2 * 1.23): 0.04 for M = 60, 0.08 for M = 15. Seeds are fixed, and results the same on
+// every machine: no alarm is by chance.
 double slope_of_spread(const Problem& p, std::uint32_t launches, const std::string& label) {
   std::vector<double> N, sd;
   fmt::print("{:<22}", label);

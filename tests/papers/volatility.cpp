@@ -1,6 +1,6 @@
-/// Stochastic volatility of the DAX, 1991-1998 (1859 daily returns): y_t ~ N(0, beta^2 exp(x_t)), x_t = phi
-/// x_{t-1}
-/// + N(0, s^2), stationary start (Taylor 1986; Kim, Shephard, Chib 1998, Rev. Econ. Stud. 65, 361-393).
+/// Stochastic volatility of the DAX, 1991-1998 (1859 daily returns): y_t ~ N(0, beta^2 exp(x_t)),
+/// x_t = phi x_{t-1} + N(0, s^2), stationary start
+/// (Taylor 1986; Kim, Shephard, Chib 1998, Rev. Econ. Stud. 65, 361-393).
 /// Source of truth: log-likelihoods by quadrature on a grid, -2511.197502 at (phi, s, beta) = (0.97, 0.2,
 /// 0.9) and -2520.781821 at (0.95, 0.3, 0.7), to 6 decimals. Criterion: the grid filter to 1e-5; the KLV
 /// filter of degree 7 with recombination to at most 200 nodes, one step a day, to 0.05, and so for the log

@@ -61,8 +61,8 @@ struct KnownAverage {
 
 /// Black, Scholes (1973); Cox, Ingersoll, Ross (1985); Heston (1993), three sets of parameters, the last
 /// beyond Feller's condition, 2 kappa theta < xi^2; Ninomiya, Victoir (2008), whose 6.04735e-2 is known to
-/// 1.5e-6; and dX = (X/2 + sqrt(X^2+1)) dt + sqrt(X^2+1) dB, E q(asinh X_t) = t^3 - 3 t^2 + 2 t for q = z^3 -
-/// 6 z^2 + 8 z.
+/// 1.5e-6; and dX = (X/2 + sqrt(X^2+1)) dt + sqrt(X^2+1) dB, E q(asinh X_t) = t^3 - 3 t^2 + 2 t for
+/// q = z^3 - 6 z^2 + 8 z.
 inline std::vector<KnownAverage> known_averages() {
   const std::string z = "log(x + sqrt(x^2 + 1))";
   return {

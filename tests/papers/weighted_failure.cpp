@@ -1,19 +1,20 @@
-/// The weighted particle filter where it fails, and where it does not (problem E): X_0 = 0, X_k = X_{k-1} +
-/// N(0, 1/2), Y_k = h(X_{k-1}) + N(0, 1), Kouritzin, Zeng (2005), Bayesian model selection via filtering,
-/// Stoch. Models 21.
+/// The weighted particle filter where it fails, and where it does not (problem E):
+///     X_0 = 0,   X_k = X_{k-1} + N(0, 1/2),   Y_k = h(X_{k-1}) + N(0, 1)
+/// (Kouritzin, Zeng 2005, Bayesian model selection via filtering, Stoch. Models 21).
 ///
-/// Were Y noise alone, the Bayes factor sigma_n(1) would have E sigma_n(1) = 1 and E sigma_n(1)^2 = E prod
-/// lambda(X_j, X'_j), X' an independent copy of X, and one particle's likelihood ratio L the second moment E
-/// prod lambda(X_j, X_j); for h(x) = x, lambda(x, xi) = exp(x xi). With C the covariance min(j, l)/2 of X_1
-/// .. X_{n-1} these are det(Id - C^2)^{-1/2} and det(Id - 2 C)^{-1/2}, infinite unless the largest eigenvalue
-/// c of C is below 1, or below 1/2:
+/// Were Y noise alone, the Bayes factor sigma_n(1) would have E sigma_n(1) = 1 and
+///     E sigma_n(1)^2 = E prod lambda(X_j, X'_j),   X' an independent copy of X,
+/// and one particle's likelihood ratio L the second moment E prod lambda(X_j, X_j); for h(x) = x,
+/// lambda(x, xi) = exp(x xi). With C the covariance min(j, l)/2 of X_1 .. X_{n-1} these are
+/// det(Id - C^2)^{-1/2} and det(Id - 2 C)^{-1/2}, infinite unless the largest eigenvalue c of C is below 1, or
+/// below 1/2:
 ///   n = 2: c = 1/2: the Bayes factor has a variance of 0.155, a particle's L none (the border of it);
 ///   n = 3: c = 1.31: both are infinite, and so from there on.
 /// Criteria. n = 1, 2: E sigma^2 by quadrature of lambda agrees with the determinant. From n = 3: the largest
 /// of 1000 records makes up more than a quarter of the sum of their empirical variances, as it does for laws
 /// without expectation, however many records there are (for a law with a variance the part is of order
-/// 1000^{-1/2}). Bounded sensor h(x) = tanh(x)/2: on the same record two independent launches differ by E
-/// (sigma - sigma')^2 = 2 gamma/N, with gamma = E prod lambda(X_j, X_j) - E prod lambda(X_j, X'_j) computed
+/// 1000^{-1/2}). Bounded sensor h(x) = tanh(x)/2: on the same record two independent launches differ by
+/// E (sigma - sigma')^2 = 2 gamma/N, with gamma = E prod lambda(X_j, X_j) - E prod lambda(X_j, X'_j) computed
 /// by quadrature. Null hypothesis: the mean over 2000 records is gamma; |t| > 8 of a Student variable has
 /// probability below 1e-14.
 #include <fmt/format.h>

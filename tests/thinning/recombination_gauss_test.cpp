@@ -103,8 +103,7 @@ TEST_CASE("Gauss quadrature of a fine Legendre rule is the Gauss-Legendre rule")
 }
 
 TEST_CASE("Gauss quadrature of a sampled normal density is the Gauss-Hermite rule") {
-  // The trapezoidal rule of step 1/8 integrates a polynomial times the normal density to exp(-(2 pi 8)^2 /
-  // 2).
+  // The trapezoidal rule of step 1/8 integrates a polynomial times the normal density to exp(-(2 pi 8)^2 / 2).
   Line grid;
   for (int i = -96; i <= 96; ++i) {
     grid.z.push_back(i / 96.0);

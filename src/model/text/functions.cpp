@@ -1,7 +1,8 @@
 // The functions of the language in GiNaC. abs, min, max and erf, with the derivatives
 //
-//   abs' = sign,   d min(a,b) = (1 - step(a-b)) da + step(a-b) db,   d max(a,b) = step(a-b) da +
-//   (1-step(a-b)) db, erf'(x) = 2/sqrt(pi) exp(-x^2),     step(x) = 1 for x > 0, else 0,
+//   abs' = sign,   erf'(x) = 2/sqrt(pi) exp(-x^2),
+//   d min(a,b) = (1 - step(a-b)) da + step(a-b) db,
+//   d max(a,b) = step(a-b) da + (1 - step(a-b)) db,     step(x) = 1 for x > 0, else 0,
 //
 // are our own: GiNaC's abs is that of complex numbers, and it has no min, max or erf.
 #include <array>
