@@ -4,16 +4,25 @@
 
 #include "study/study_keys.hpp"
 #include "wienertree/cubature/formula_keys.hpp"
+#include "wienertree/model/text/function_names.hpp"
 #include "wienertree/model/text/model_keys.hpp"
 
 namespace wienertree::app {
 namespace {
 
+std::string function_list() {
+  std::string names;
+  for (const text::FunctionName& function : text::function_names)
+    names += (names.empty() ? "" : " ") + std::string(function.name);
+  return names;
+}
+
 FileFormat model_format() {
   return {"model",
           "A model is a TOML file. Expressions are text or numbers, of the states, the parameters, the time "
           "t and pi, with\n"
-          "+ - * / ^, parentheses, exp log sqrt sin cos tan sinh cosh tanh atan erf abs min max.\n",
+          "+ - * / ^, parentheses, comparisons (x > 1: 1 or 0), and, or, not, if(condition, a, b),\n" +
+              function_list() + ".\n",
           {{"At the top", "", text::model_keys},
            {"[state] NAME = { .. }", "", text::state_keys},
            {"[observation]", "", text::observation_keys},

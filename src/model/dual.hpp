@@ -10,21 +10,10 @@
 #include <cmath>
 #include <concepts>
 #include <cstddef>
-#include <numbers>
+
+#include "wienertree/model/scalar_functions.hpp"
 
 namespace wienertree {
-
-/// What a Dual of doubles asks of a double beyond the C library; NaN of NaN.
-namespace scalar {
-/// -1, 0, 1
-inline double sign(double x) { return x != x ? x : double(x > 0) - double(x < 0); }
-/// 1 for x > 0, else 0
-inline double step(double x) { return x != x ? x : double(x > 0); }
-inline double min(double a, double b) { return a < b || a != a ? a : b; }
-inline double max(double a, double b) { return a > b || a != a ? a : b; }
-/// weight * slope, and 0 where the slope is 0 whatever the weight.
-inline double weighted(double weight, double slope) { return slope == 0.0 ? 0.0 : weight * slope; }
-}  // namespace scalar
 
 template <class S, std::size_t n>
 class Dual {
@@ -80,58 +69,16 @@ class Dual {
     return result;
   }
 
-  friend Dual exp(const Dual& a) {
-    using std::exp;
-    const S y = exp(a.value);
-    return of(y, y, a);
+// f(a) and its slope for every elementary function.
+#define X(operation, name, algebra, machine, derivative) \
+  friend Dual name(const Dual& a) {                      \
+    using namespace scalar;                              \
+    [[maybe_unused]] const S& x = a.value;               \
+    const S y = name(x);                                 \
+    return of(y, derivative, a);                         \
   }
-  friend Dual log(const Dual& a) {
-    using std::log;
-    return of(log(a.value), 1.0 / a.value, a);
-  }
-  friend Dual sqrt(const Dual& a) {
-    using std::sqrt;
-    const S y = sqrt(a.value);
-    return of(y, 0.5 / y, a);
-  }
-  friend Dual sin(const Dual& a) {
-    using std::cos, std::sin;
-    return of(sin(a.value), cos(a.value), a);
-  }
-  friend Dual cos(const Dual& a) {
-    using std::cos, std::sin;
-    return of(cos(a.value), -sin(a.value), a);
-  }
-  friend Dual tan(const Dual& a) {
-    using std::tan;
-    const S y = tan(a.value);
-    return of(y, 1.0 + y * y, a);
-  }
-  friend Dual sinh(const Dual& a) {
-    using std::cosh, std::sinh;
-    return of(sinh(a.value), cosh(a.value), a);
-  }
-  friend Dual cosh(const Dual& a) {
-    using std::cosh, std::sinh;
-    return of(cosh(a.value), sinh(a.value), a);
-  }
-  friend Dual tanh(const Dual& a) {
-    using std::tanh;
-    const S y = tanh(a.value);
-    return of(y, 1.0 - y * y, a);
-  }
-  friend Dual atan(const Dual& a) {
-    using std::atan;
-    return of(atan(a.value), 1.0 / (1.0 + a.value * a.value), a);
-  }
-  friend Dual erf(const Dual& a) {
-    using std::erf, std::exp;
-    return of(erf(a.value), 2.0 * std::numbers::inv_sqrtpi * exp(-(a.value * a.value)), a);
-  }
-  friend Dual erfc(const Dual& a) {
-    using std::erfc, std::exp;
-    return of(erfc(a.value), -2.0 * std::numbers::inv_sqrtpi * exp(-(a.value * a.value)), a);
-  }
+  WIENERTREE_ELEMENTARY_FUNCTIONS(X)
+#undef X
   friend Dual pow(const Dual& a, double exponent) {
     using std::pow;
     if (exponent == 0.0) return Dual(1.0);
@@ -150,6 +97,19 @@ class Dual {
   friend Dual step(const Dual& a) {
     using scalar::step;
     return Dual(step(a.value));
+  }
+  /// The condition itself is taken to have derivative 0.
+  friend Dual where(const Dual& condition, const Dual& b) {
+    using scalar::where;
+    Dual result(where(condition.value, b.value));
+    for (std::size_t l = 0; l < n; ++l) result.slopes[l] = where(condition.value, b.slopes[l]);
+    return result;
+  }
+  friend Dual unless(const Dual& condition, const Dual& b) {
+    using scalar::unless;
+    Dual result(unless(condition.value, b.value));
+    for (std::size_t l = 0; l < n; ++l) result.slopes[l] = unless(condition.value, b.slopes[l]);
+    return result;
   }
   friend Dual abs(const Dual& a) {
     using scalar::sign, std::abs;

@@ -34,24 +34,23 @@ class Recorded {
   Recorded& operator*=(const Recorded& b) { return *this = *this * b; }
   Recorded& operator/=(const Recorded& b) { return *this = *this / b; }
 
-  friend Recorded exp(const Recorded& a) { return record(Op::exponential, a); }
-  friend Recorded log(const Recorded& a) { return record(Op::logarithm, a); }
-  friend Recorded sqrt(const Recorded& a) { return record(Op::square_root, a); }
-  friend Recorded sin(const Recorded& a) { return record(Op::sine, a); }
-  friend Recorded cos(const Recorded& a) { return record(Op::cosine, a); }
-  friend Recorded tan(const Recorded& a) { return record(Op::tangent, a); }
-  friend Recorded sinh(const Recorded& a) { return record(Op::hyperbolic_sine, a); }
-  friend Recorded cosh(const Recorded& a) { return record(Op::hyperbolic_cosine, a); }
-  friend Recorded tanh(const Recorded& a) { return record(Op::hyperbolic_tangent, a); }
-  friend Recorded atan(const Recorded& a) { return record(Op::arctangent, a); }
-  friend Recorded erf(const Recorded& a) { return record(Op::error_function, a); }
-  friend Recorded erfc(const Recorded& a) { return record(Op::error_function_complement, a); }
+#define X(operation, name, ...) \
+  friend Recorded name(const Recorded& a) { return record(Op::operation, a); }
+  WIENERTREE_ELEMENTARY_FUNCTIONS(X)
+#undef X
   friend Recorded abs(const Recorded& a) { return record(Op::absolute, a); }
   friend Recorded sign(const Recorded& a) { return record(Op::sign, a); }
   friend Recorded step(const Recorded& a) { return record(Op::step, a); }
   friend Recorded pow(const Recorded& a, const Recorded& b) { return record(Op::power, a, b); }
   friend Recorded min(const Recorded& a, const Recorded& b) { return record(Op::minimum, a, b); }
   friend Recorded max(const Recorded& a, const Recorded& b) { return record(Op::maximum, a, b); }
+  /// b where the condition is not 0, else 0, whatever b is there; `unless`: where it is 0.
+  friend Recorded where(const Recorded& condition, const Recorded& b) {
+    return record(Op::where, condition, b);
+  }
+  friend Recorded unless(const Recorded& condition, const Recorded& b) {
+    return record(Op::unless, condition, b);
+  }
   friend Recorded weighted(const Recorded& weight, const Recorded& slope) {
     return slope.is_constant(0.0) ? slope : weight * slope;
   }

@@ -5,9 +5,15 @@
 #include <cassert>
 #include <cmath>
 
+#include "wienertree/model/scalar_functions.hpp"
 #include "wienertree/model/tape_kernel_table.hpp"
 
 namespace wienertree {
+
+#define X(operation, name, ...) \
+  double scalar_##operation(double x) { return scalar::name(x); }
+WIENERTREE_ELEMENTARY_FUNCTIONS(X)
+#undef X
 
 double apply(Op op, double a, double b) {
   switch (op) {
@@ -22,41 +28,26 @@ double apply(Op op, double a, double b) {
     case Op::power:
       return std::pow(a, b);
     case Op::minimum:
-      return a < b || a != a ? a : b;
+      return scalar::min(a, b);
     case Op::maximum:
-      return a > b || a != a ? a : b;
+      return scalar::max(a, b);
+    case Op::where:
+      return scalar::where(a, b);
+    case Op::unless:
+      return scalar::unless(a, b);
     case Op::negate:
       return -a;
     case Op::absolute:
       return std::abs(a);
     case Op::sign:
-      return a != a ? a : double(a > 0) - double(a < 0);
+      return scalar::sign(a);
     case Op::step:
-      return a != a ? a : double(a > 0);
-    case Op::square_root:
-      return std::sqrt(a);
-    case Op::exponential:
-      return std::exp(a);
-    case Op::logarithm:
-      return std::log(a);
-    case Op::sine:
-      return std::sin(a);
-    case Op::cosine:
-      return std::cos(a);
-    case Op::tangent:
-      return std::tan(a);
-    case Op::hyperbolic_sine:
-      return std::sinh(a);
-    case Op::hyperbolic_cosine:
-      return std::cosh(a);
-    case Op::hyperbolic_tangent:
-      return std::tanh(a);
-    case Op::arctangent:
-      return std::atan(a);
-    case Op::error_function:
-      return std::erf(a);
-    case Op::error_function_complement:
-      return std::erfc(a);
+      return scalar::step(a);
+#define X(operation, name, ...) \
+  case Op::operation:           \
+    return scalar::name(a);
+      WIENERTREE_ELEMENTARY_FUNCTIONS(X)
+#undef X
   }
   assert(false);
   return 0.0;
@@ -64,7 +55,17 @@ double apply(Op op, double a, double b) {
 
 bool Tape::jumps() const {
   return std::any_of(program_.begin(), program_.end(), [](const TapeInstruction& i) {
-    return i.code == TapeCode::sign_v || i.code == TapeCode::step_v;
+    switch (i.code) {
+      case TapeCode::sign_v:
+      case TapeCode::step_v:
+      case TapeCode::where_vv:
+      case TapeCode::where_vs:
+      case TapeCode::unless_vv:
+      case TapeCode::unless_vs:
+        return true;
+      default:
+        return false;
+    }
   });
 }
 

@@ -18,35 +18,25 @@
 
 namespace wienertree {
 
-/// Operations of an expression. A NaN operand gives NaN (also in minimum, maximum, sign and step), with the
-/// one exception of power(NaN, 0) = 1; a value out of the domain gives NaN.
+/// Operations of an expression. A NaN operand gives NaN (also in minimum, maximum, sign and step), except
+/// that power(NaN, 0) = 1 and that `where` and `unless` ignore the operand that they do not choose; a value
+/// out of the domain gives NaN.
 enum class Op : std::uint8_t {
-  add,
-  subtract,
-  multiply,
-  divide,
-  power,
-  minimum,
-  maximum,
-  negate,
-  absolute,
-  sign,  ///< -1, 0, 1
-  step,  ///< 1 for x > 0, else 0
-  square_root,
-  exponential,
-  logarithm,
-  sine,
-  cosine,
-  tangent,
-  hyperbolic_sine,
-  hyperbolic_cosine,
-  hyperbolic_tangent,
-  arctangent,
-  error_function,
-  error_function_complement,
+// In this order: add, subtract, multiply, divide, power, minimum, maximum,
+// where: b where the condition a holds (is not 0), else 0, whatever b is there;
+// unless: b where it does not hold, else 0;
+// negate, absolute, sign: -1, 0, 1; step: 1 for x > 0, else 0; the elementary functions.
+#define X(name, ...) name,
+  WIENERTREE_TAPE_BINARY(X) WIENERTREE_TAPE_UNARY(X) WIENERTREE_ELEMENTARY_FUNCTIONS(X)
+#undef X
 };
 
-constexpr bool is_binary(Op op) { return op <= Op::maximum; }
+constexpr bool is_binary(Op op) { return op <= Op::unless; }
+/// Whether the value jumps or has a kink as a function of an argument.
+constexpr bool is_piecewise(Op op) {
+  return op == Op::minimum || op == Op::maximum || op == Op::where || op == Op::unless ||
+         op == Op::absolute || op == Op::sign || op == Op::step;
+}
 
 /// The operation on numbers, by the C library's scalar functions. `b` is ignored by unary operations.
 double apply(Op op, double a, double b = 0.0);
@@ -58,7 +48,7 @@ class Tape {
   std::size_t uniforms() const { return uniforms_; }
   std::size_t outputs() const { return outputs_; }
   std::size_t registers() const { return registers_; }
-  /// Whether an output jumps: sign or step of something that differs from node to node.
+  /// Whether an output jumps: sign, step or a condition of something that differs from node to node.
   bool jumps() const;
   std::size_t instructions() const { return program_.size(); }  ///< run for every block of nodes
   std::size_t uniform_instructions() const { return uniform_program_.size(); }  ///< run once per call

@@ -76,6 +76,11 @@ TapeBuilder::Value TapeBuilder::binary(Op op, Value a, Value b) {
       return quotient(a, b);
     case Op::power:
       return power(a, b);
+    case Op::where:
+    case Op::unless:
+      if (is_constant(a) && !std::isnan(at(a).value))
+        return (at(a).value != 0) == (op == Op::where) ? b : constant(0.0);
+      return operation(op, a, b);
     default:  // minimum, maximum: commutative and idempotent
       if (a == b) return a;
       return operation(op, std::max(a, b), std::min(a, b));

@@ -21,8 +21,8 @@ TapeCode first_code(Op op) {
 #define X(name) TapeCode::name##_vv,
       WIENERTREE_TAPE_BINARY(X)
 #undef X
-#define X(name) TapeCode::name##_v,
-          WIENERTREE_TAPE_UNARY(X)
+#define X(name, ...) TapeCode::name##_v,
+          WIENERTREE_TAPE_UNARY(X) WIENERTREE_ELEMENTARY_FUNCTIONS(X)
 #undef X
   };
   return codes[static_cast<std::size_t>(op)];

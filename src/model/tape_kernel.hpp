@@ -7,6 +7,8 @@
 #include <stddef.h>
 #include <stdint.h>
 
+#include "wienertree/model/elementary_functions.hpp"
+
 namespace wienertree {
 
 /// Nodes in a block.
@@ -14,12 +16,11 @@ inline constexpr size_t tape_block = 128;
 
 /// Instructions of the tape. A suffix names the operands: v a slot with a value per node, s a scalar.
 // clang-format off
-#define WIENERTREE_TAPE_BINARY(X) X(add) X(subtract) X(multiply) X(divide) X(power) X(minimum) X(maximum)
+#define WIENERTREE_TAPE_BINARY(X) \
+  X(add) X(subtract) X(multiply) X(divide) X(power) X(minimum) X(maximum) X(where) X(unless)
 #define WIENERTREE_TAPE_FUSED(X) X(multiply_add) X(multiply_subtract) X(negative_multiply_add)
-#define WIENERTREE_TAPE_UNARY(X) \
-  X(negate) X(absolute) X(sign) X(step) X(square_root) X(exponential) X(logarithm) X(sine) X(cosine) X(tangent) \
-  X(hyperbolic_sine) X(hyperbolic_cosine) X(hyperbolic_tangent) X(arctangent) X(error_function) \
-  X(error_function_complement)
+/// What each Machine writes itself; the elementary functions follow.
+#define WIENERTREE_TAPE_UNARY(X) X(negate) X(absolute) X(sign) X(step)
 
 enum class TapeCode : uint8_t {
   copy_v,
@@ -30,8 +31,9 @@ enum class TapeCode : uint8_t {
 #define X(name) name##_vvv, name##_vvs, name##_vsv, name##_vss,
   WIENERTREE_TAPE_FUSED(X)  // a b + c,  a b - c,  c - a b
 #undef X
-#define X(name) name##_v,
+#define X(name, ...) name##_v,
   WIENERTREE_TAPE_UNARY(X)
+  WIENERTREE_ELEMENTARY_FUNCTIONS(X)
 #undef X
 };
 // clang-format on

@@ -57,8 +57,9 @@ void run_program(const TapeInstruction* program, size_t instructions, double* co
     switch (i->code) {
       WIENERTREE_CASE_1(copy_v, PerNode, a[lane])
       WIENERTREE_CASE_1(copy_s, Shared, a[lane])
-#define X(name) WIENERTREE_CASE_1(name##_v, PerNode, Machine::name(a[lane]))
+#define X(name, ...) WIENERTREE_CASE_1(name##_v, PerNode, Machine::name(a[lane]))
       WIENERTREE_TAPE_UNARY(X)
+      WIENERTREE_ELEMENTARY_FUNCTIONS(X)
 #undef X
 #define X(name)                                        \
   WIENERTREE_CASE_2(name##_vv, PerNode, PerNode, name) \

@@ -8,8 +8,7 @@
 #define WIENERTREE_INTRINSIC(name) _mm256_##name
 #define WIENERTREE_LIBMVEC_1(name) _ZGVdN4v_##name
 #define WIENERTREE_LIBMVEC_2(name) _ZGVdN4vv_##name
-#define WIENERTREE_EXP vector_exp
-#define WIENERTREE_TANH vector_tanh
+#define WIENERTREE_FUSED(name) vector_##name
 
 namespace wienertree {
 namespace {
@@ -22,6 +21,12 @@ __m256d positive(__m256d a) {
   return _mm256_and_pd(_mm256_cmp_pd(a, _mm256_setzero_pd(), _CMP_GT_OQ), _mm256_set1_pd(1.0));
 }
 __m256d magnitude(__m256d a) { return _mm256_andnot_pd(_mm256_set1_pd(-0.0), a); }
+__m256d where_not_zero(__m256d c, __m256d a) {
+  return _mm256_and_pd(_mm256_cmp_pd(c, _mm256_setzero_pd(), _CMP_NEQ_UQ), a);
+}
+__m256d where_zero(__m256d c, __m256d a) {
+  return _mm256_and_pd(_mm256_cmp_pd(c, _mm256_setzero_pd(), _CMP_EQ_OQ), a);
+}
 
 }  // namespace
 }  // namespace wienertree

@@ -8,8 +8,7 @@
 #define WIENERTREE_INTRINSIC(name) _mm512_##name
 #define WIENERTREE_LIBMVEC_1(name) _ZGVeN8v_##name
 #define WIENERTREE_LIBMVEC_2(name) _ZGVeN8vv_##name
-#define WIENERTREE_EXP vector_exp
-#define WIENERTREE_TANH vector_tanh
+#define WIENERTREE_FUSED(name) vector_##name
 
 namespace wienertree {
 namespace {
@@ -22,6 +21,12 @@ __m512d positive(__m512d a) {
   return _mm512_maskz_mov_pd(_mm512_cmp_pd_mask(a, _mm512_setzero_pd(), _CMP_GT_OQ), _mm512_set1_pd(1.0));
 }
 __m512d magnitude(__m512d a) { return _mm512_abs_pd(a); }
+__m512d where_not_zero(__m512d c, __m512d a) {
+  return _mm512_maskz_mov_pd(_mm512_cmp_pd_mask(c, _mm512_setzero_pd(), _CMP_NEQ_UQ), a);
+}
+__m512d where_zero(__m512d c, __m512d a) {
+  return _mm512_maskz_mov_pd(_mm512_cmp_pd_mask(c, _mm512_setzero_pd(), _CMP_EQ_OQ), a);
+}
 
 }  // namespace
 }  // namespace wienertree

@@ -21,6 +21,8 @@ struct Machine {
   static double power(double a, double b) { return pow(a, b); }
   static double minimum(double a, double b) { return a < b || a != a ? a : b; }
   static double maximum(double a, double b) { return a > b || a != a ? a : b; }
+  static double where(double c, double a) { return c != c ? c : c != 0 ? a : 0.0; }
+  static double unless(double c, double a) { return c != c ? c : c != 0 ? 0.0 : a; }
 
   static double multiply_add(double a, double b, double c) { return a * b + c; }
   static double multiply_subtract(double a, double b, double c) { return a * b - c; }
@@ -31,17 +33,15 @@ struct Machine {
   static double sign(double a) { return a != a ? a : double(a > 0) - double(a < 0); }
   static double step(double a) { return a != a ? a : double(a > 0); }
   static double square_root(double a) { return sqrt(a); }
-  static double exponential(double a) { return exp(a); }
-  static double logarithm(double a) { return log(a); }
-  static double sine(double a) { return sin(a); }
-  static double cosine(double a) { return cos(a); }
-  static double tangent(double a) { return tan(a); }
-  static double hyperbolic_sine(double a) { return sinh(a); }
-  static double hyperbolic_cosine(double a) { return cosh(a); }
-  static double hyperbolic_tangent(double a) { return tanh(a); }
-  static double arctangent(double a) { return atan(a); }
-  static double error_function(double a) { return erf(a); }
-  static double error_function_complement(double a) { return erfc(a); }
+
+#define WIENERTREE_direct(operation)
+#define WIENERTREE_scalar(operation) \
+  static double operation(double a) { return scalar_##operation(a); }
+#define WIENERTREE_libmvec(operation) WIENERTREE_scalar(operation)
+#define WIENERTREE_fused(operation) WIENERTREE_scalar(operation)
+#define X(operation, name, algebra, machine, derivative) WIENERTREE_##machine(operation)
+  WIENERTREE_ELEMENTARY_FUNCTIONS(X)
+#undef X
 };
 
 }  // namespace

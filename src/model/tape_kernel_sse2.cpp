@@ -8,8 +8,7 @@
 #define WIENERTREE_INTRINSIC(name) _mm_##name
 #define WIENERTREE_LIBMVEC_1(name) _ZGVbN2v_##name
 #define WIENERTREE_LIBMVEC_2(name) _ZGVbN2vv_##name
-#define WIENERTREE_EXP WIENERTREE_LIBMVEC_1(exp)
-#define WIENERTREE_TANH WIENERTREE_LIBMVEC_1(tanh)
+#define WIENERTREE_FUSED(name) WIENERTREE_LIBMVEC_1(name)
 
 namespace wienertree {
 namespace {
@@ -21,6 +20,8 @@ __m128d nan_of(__m128d a, __m128d result) {
 }
 __m128d positive(__m128d a) { return _mm_and_pd(_mm_cmpgt_pd(a, _mm_setzero_pd()), _mm_set1_pd(1.0)); }
 __m128d magnitude(__m128d a) { return _mm_andnot_pd(_mm_set1_pd(-0.0), a); }
+__m128d where_not_zero(__m128d c, __m128d a) { return _mm_and_pd(_mm_cmpneq_pd(c, _mm_setzero_pd()), a); }
+__m128d where_zero(__m128d c, __m128d a) { return _mm_and_pd(_mm_cmpeq_pd(c, _mm_setzero_pd()), a); }
 
 }  // namespace
 }  // namespace wienertree

@@ -4,6 +4,11 @@
 
 namespace wienertree {
 
+/// The elementary functions on one number, for those that a machine computes lane by lane.
+#define X(operation, ...) double scalar_##operation(double x);
+WIENERTREE_ELEMENTARY_FUNCTIONS(X)
+#undef X
+
 extern const TapeKernel portable_kernel;
 #ifdef WIENERTREE_LIBMVEC
 extern const TapeKernel sse2_kernel;

@@ -2,20 +2,28 @@
 // WIENERTREE_VECTOR (__m256d, say), WIENERTREE_INTRINSIC(name) (_mm256_name), WIENERTREE_LIBMVEC_1(name) and
 // WIENERTREE_LIBMVEC_2(name) (the functions of one and two arguments of glibc's libmvec, by their names in
 // the x86-64 vector function ABI: _ZGV, instruction set, N for unmasked, width, a v for each argument),
-// WIENERTREE_EXP(x) and WIENERTREE_TANH(x), and the functions
+// WIENERTREE_FUSED(name) (vector_name of tape_exponential.inl, or WIENERTREE_LIBMVEC_1(name)), and the functions
 //
 //   fused(a, b, c)      a b + c, in one rounding where the machine can
 //   nan_of(a, result)   a where a is NaN, else result
 //   positive(a)         1 where a > 0, else 0
 //   magnitude(a)        |a|
+//   where_not_zero(c, a), where_zero(c, a)   a where c is not 0, or is; else 0
 
 extern "C" {
-#define X(name) __attribute__((const)) WIENERTREE_VECTOR WIENERTREE_LIBMVEC_1(name)(WIENERTREE_VECTOR);
-X(exp)
-X(log)
-X(sin) X(cos) X(tan) X(sinh) X(cosh) X(tanh) X(atan) X(erf) X(erfc)
+#define WIENERTREE_direct(name)
+#define WIENERTREE_scalar(name)
+#define WIENERTREE_libmvec(name) \
+  __attribute__((const)) WIENERTREE_VECTOR WIENERTREE_LIBMVEC_1(name)(WIENERTREE_VECTOR);
+#define WIENERTREE_fused(name) WIENERTREE_libmvec(name)
+#define X(operation, name, algebra, machine, derivative) WIENERTREE_##machine(name)
+WIENERTREE_ELEMENTARY_FUNCTIONS(X)
 #undef X
-    __attribute__((const)) WIENERTREE_VECTOR WIENERTREE_LIBMVEC_2(pow)(WIENERTREE_VECTOR, WIENERTREE_VECTOR);
+#undef WIENERTREE_direct
+#undef WIENERTREE_scalar
+#undef WIENERTREE_libmvec
+#undef WIENERTREE_fused
+__attribute__((const)) WIENERTREE_VECTOR WIENERTREE_LIBMVEC_2(pow)(WIENERTREE_VECTOR, WIENERTREE_VECTOR);
 }
 
 namespace wienertree {
@@ -36,6 +44,8 @@ struct Machine {
   // The processor's minimum and maximum give b where either is NaN.
   static Vector minimum(Vector a, Vector b) { return nan_of(a, WIENERTREE_INTRINSIC(min_pd)(a, b)); }
   static Vector maximum(Vector a, Vector b) { return nan_of(a, WIENERTREE_INTRINSIC(max_pd)(a, b)); }
+  static Vector where(Vector c, Vector a) { return nan_of(c, where_not_zero(c, a)); }
+  static Vector unless(Vector c, Vector a) { return nan_of(c, where_zero(c, a)); }
 
   static Vector multiply_add(Vector a, Vector b, Vector c) { return fused(a, b, c); }
   static Vector multiply_subtract(Vector a, Vector b, Vector c) { return fused(a, b, -c); }
@@ -46,17 +56,25 @@ struct Machine {
   static Vector sign(Vector a) { return nan_of(a, positive(a) - positive(-a)); }
   static Vector step(Vector a) { return nan_of(a, positive(a)); }
   static Vector square_root(Vector a) { return WIENERTREE_INTRINSIC(sqrt_pd)(a); }
-  static Vector exponential(Vector a) { return WIENERTREE_EXP(a); }
-  static Vector logarithm(Vector a) { return WIENERTREE_LIBMVEC_1(log)(a); }
-  static Vector sine(Vector a) { return WIENERTREE_LIBMVEC_1(sin)(a); }
-  static Vector cosine(Vector a) { return WIENERTREE_LIBMVEC_1(cos)(a); }
-  static Vector tangent(Vector a) { return WIENERTREE_LIBMVEC_1(tan)(a); }
-  static Vector hyperbolic_sine(Vector a) { return WIENERTREE_LIBMVEC_1(sinh)(a); }
-  static Vector hyperbolic_cosine(Vector a) { return WIENERTREE_LIBMVEC_1(cosh)(a); }
-  static Vector hyperbolic_tangent(Vector a) { return WIENERTREE_TANH(a); }
-  static Vector arctangent(Vector a) { return WIENERTREE_LIBMVEC_1(atan)(a); }
-  static Vector error_function(Vector a) { return WIENERTREE_LIBMVEC_1(erf)(a); }
-  static Vector error_function_complement(Vector a) { return WIENERTREE_LIBMVEC_1(erfc)(a); }
+
+#define WIENERTREE_direct(operation, name)
+#define WIENERTREE_scalar(operation, name) \
+  static Vector operation(Vector a) { return lane_by_lane(a, scalar_##operation); }
+#define WIENERTREE_libmvec(operation, name) \
+  static Vector operation(Vector a) { return WIENERTREE_LIBMVEC_1(name)(a); }
+#define WIENERTREE_fused(operation, name) \
+  static Vector operation(Vector a) { return WIENERTREE_FUSED(name)(a); }
+#define X(operation, name, algebra, machine, derivative) WIENERTREE_##machine(operation, name)
+  WIENERTREE_ELEMENTARY_FUNCTIONS(X)
+#undef X
+
+ private:
+  static Vector lane_by_lane(Vector a, double (*f)(double)) {
+    double lanes[width];
+    store(lanes, a);
+    for (size_t i = 0; i < width; ++i) lanes[i] = f(lanes[i]);
+    return load(lanes);
+  }
 };
 
 }  // namespace

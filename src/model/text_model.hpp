@@ -2,8 +2,8 @@
 /// Models as text: a TOML file with the coefficients as expressions.
 ///
 /// An expression is made of + - * / ^, parentheses, numbers, pi, parameters, state names, the time t and the
-/// functions exp log sqrt sin cos tan sinh cosh tanh atan erf abs min max. ^ is right associative and binds
-/// tighter than a sign: -x^2 = -(x^2). The drift is given in the Ito or the Stratonovich sense, and the other
+/// functions of elementary_functions.hpp, abs sign min max; of comparisons, which are 1 or 0, and, or, not, and
+/// if(condition, a, b). ^ is right associative and binds tighter than a sign: -x^2 = -(x^2). The drift is given in the Ito or the Stratonovich sense, and the other
 /// one derived.
 #include <memory>
 #include <optional>

@@ -52,6 +52,15 @@ TEST_CASE("mistakes in expressions name the column") {
       {"(x^900)^900", 7, "exponent larger than 1000", "*"},
       {"((2*x)^1000)^1000", 12, "exponent larger than 1000", "*"},
       {"y1", 0, "unknown name", "y1"},
+      {"x == v", 2, "equality is not part of the language", "=="},
+      {"x != v", 2, "equality is not part of the language", "!="},
+      {"0 < x < 1", 6, "comparisons do not chain", "*"},
+      {"x and v > 0", 0, "'and' is for comparisons", "x"},
+      {"x > 0 or v", 9, "'or' is for comparisons", "v"},
+      {"not v", 4, "'not' is for comparisons", "v"},
+      {"if(x > 0, v)", 0, "if takes 3 arguments", "*"},
+      {"x + and", 4, "'and' stands between two conditions", "*"},
+      {"cosinus(x)", 0, "there are sqrt exp log", "cosinus"},
       {"max(x, v", 3, "missing ')'", "*"},
       {"x, v", 1, "unexpected symbol", ","},
   };
@@ -61,6 +70,10 @@ TEST_CASE("mistakes in expressions name the column") {
   }
   // Where escapes or lines break the count, the place of the string stands.
   require_error({"\"-v\"", "\"\"\"\n-v +\n\"\"\"", "m.toml:11:5, drift.v", "ends too early"});
+}
+
+TEST_CASE("words of the language are no names") {
+  require_error({"kappa = 1.5", "and = 1.5", "m.toml:4:7, parameters.and", "is a word of the language", "*"});
 }
 
 TEST_CASE("what a scope allows") {

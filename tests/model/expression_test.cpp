@@ -68,10 +68,45 @@ TEST_CASE("functions") {
 
 TEST_CASE("derivatives of every function agree with finite differences") {
   // Central differences at step 1e-5: truncation and rounding below 1e-9 for these functions.
-  for (const char* f : {"exp(x)",     "log(x)",    "sqrt(x)",     "sin(x)",       "cos(x)",      "tan(x)",
-                        "sinh(x)",    "cosh(x)",   "tanh(x)",     "atan(x)",      "erf(x)",      "abs(x)",
-                        "abs(x - 2)", "min(x, y)", "max(x, y)",   "min(y, x^2)",  "max(2*y, x)", "x^y",
-                        "y^x",        "x^a",       "1/(1 + x^3)", "a^x*erf(b*x)", "abs(x)^3"}) {
+  for (const char* f : {"exp(x)",
+                        "log(x)",
+                        "sqrt(x)",
+                        "sin(x)",
+                        "cos(x)",
+                        "tan(x)",
+                        "sinh(x)",
+                        "cosh(x)",
+                        "tanh(x)",
+                        "atan(x)",
+                        "erf(x)",
+                        "abs(x)",
+                        "abs(x - 2)",
+                        "min(x, y)",
+                        "max(x, y)",
+                        "min(y, x^2)",
+                        "max(2*y, x)",
+                        "x^y",
+                        "y^x",
+                        "x^a",
+                        "1/(1 + x^3)",
+                        "a^x*erf(b*x)",
+                        "abs(x)^3",
+                        "asin(x)",
+                        "acos(x*y)",
+                        "asinh(x)",
+                        "acosh(1 + x)",
+                        "atanh(x)",
+                        "expm1(x)",
+                        "log1p(x*y)",
+                        "erfc(x)",
+                        "normcdf(b*x - y)",
+                        "lgamma(x + y)",
+                        "digamma(x)",
+                        "x*sign(x - y)",
+                        "(x > y)*x + (x <= 1)*y",
+                        "if(x < y, sin(x), log(x - 1))",
+                        "if(x > y and y > 0, sqrt(x - y), x*y)",
+                        "lgamma(x*y)"}) {
     INFO(f);
     const TextModel model = model_of(f);
     const VectorFields& fields = *model.model().fields;
@@ -84,6 +119,73 @@ TEST_CASE("derivatives of every function agree with finite differences") {
     CHECK(J[0] == Approx(by_x).margin(1e-8));
     CHECK(J[1] == Approx(by_y).margin(1e-8));
   }
+}
+
+TEST_CASE("functions that the C library has or lacks") {
+  CHECK(evaluate("asin(x)") == Approx(std::asin(0.4)).epsilon(1e-15));
+  CHECK(evaluate("acos(x)") == Approx(std::acos(0.4)).epsilon(1e-15));
+  CHECK(evaluate("asinh(x)") == Approx(std::asinh(0.4)).epsilon(1e-15));
+  CHECK(evaluate("acosh(1 + x)") == Approx(std::acosh(1.4)).epsilon(1e-15));
+  CHECK(evaluate("atanh(x)") == Approx(std::atanh(0.4)).epsilon(1e-15));
+  CHECK(evaluate("expm1(x/1e9)") == Approx(std::expm1(0.4e-9)).epsilon(1e-15));
+  CHECK(evaluate("log1p(x/1e9)") == Approx(std::log1p(0.4e-9)).epsilon(1e-15));
+  CHECK(evaluate("erfc(x)") == Approx(std::erfc(0.4)).epsilon(1e-15));
+  CHECK(evaluate("lgamma(x)") == Approx(std::lgamma(0.4)).epsilon(1e-15));
+  CHECK(evaluate("normcdf(x)") == Approx(0.65542174161032429).epsilon(1e-15));
+  CHECK(evaluate("normcdf(-20 + 0*x)") == Approx(2.7536241186062337e-89).epsilon(1e-14));
+  CHECK(evaluate("digamma(1)") == Approx(-0.57721566490153286).epsilon(1e-15));  // minus Euler's constant
+  CHECK(evaluate("trigamma(1)") == Approx(std::acos(-1.0) * std::acos(-1.0) / 6).epsilon(1e-15));
+  CHECK(evaluate("sign(x) + 10*sign(-y) + 100*sign(x - x)") == -9);
+}
+
+TEST_CASE("comparisons are 1 or 0, and if chooses") {
+  CHECK(evaluate("x > 0.4") == 0);
+  CHECK(evaluate("x >= 0.4") == 1);
+  CHECK(evaluate("x < 0.4") == 0);
+  CHECK(evaluate("x <= 0.4") == 1);
+  CHECK(evaluate("x > y") == 0);
+  CHECK(evaluate("x < y") == 1);
+  CHECK(evaluate("2*(x < y) + 1") == 3);
+  CHECK(evaluate("x < y and y < 1") == 1);
+  CHECK(evaluate("x > y or y < 1") == 1);
+  CHECK(evaluate("x > y or y > 1") == 0);
+  CHECK(evaluate("not x > y and not (y > 1 or x > 1)") == 1);
+  CHECK(evaluate("(x > 0.1) + (x > 0.2) + (x > 0.9)") == 2);
+  CHECK(evaluate("if(x > y, x, 2*y)") == 1.4);
+  CHECK(evaluate("if(x < y, x, 2*y)") == 0.4);
+  CHECK(evaluate("if(x > 0, log(x), -1000)", -1) == -1000);  // the other branch has no value there
+  CHECK(evaluate("if(x > 0, -1000, sqrt(-x))", -4) == 2);
+  CHECK(evaluate("if(1 > 2, x, y)") == 0.7);
+  CHECK(evaluate("if(a > b, x, if(a < b, 10*x, y))") == 4);
+  CHECK(evaluate("min(x > 0, y > 1)") == 0);
+  CHECK(std::isnan(evaluate("x > 0", std::nan(""))));
+  // The derivative of the branch that is not taken has no value either.
+  const TextModel model = model_of("if(x > 0, x*log(x), x^2)");
+  CHECK(jacobian(*model.model().fields, {-1, 0}, {1, 0})[0] == -2);
+}
+
+TEST_CASE("conditions are printed in the language") {
+  const TextModel model = model_of("if(x > y, max(x, y)^2, sign(x)) + (x >= 1)");
+  const ModelAnalysis shown = model.analysis();
+  const std::string jacobian = shown.jacobians[0][0];
+  INFO(shown.fields[0][0] << "   derivative " << jacobian);
+  for (const Point& p : {Point{0.4, 0.7}, Point{1.4, 0.7}, Point{-0.3, -0.2}}) {
+    CHECK(value_of(model, shown.fields[0][0], p) ==
+          value_of(model, "if(x > y, max(x, y)^2, sign(x)) + (x >= 1)", p));
+    CHECK(std::isfinite(value_of(model, jacobian, p)));
+  }
+}
+
+TEST_CASE("0 log(0) is 0 in a log density") {
+  const TextModel model = TextModel::parse(
+      "convention = \"ito\"\n[state]\nm = { initial = 1 }\n[drift]\nm = 0\n[diffusion]\nm = [1]\n"
+      "[observation]\nkind = \"discrete\"\nlog_likelihood = \"y1*log(m) - m - lgamma(y1 + 1)\"\n",
+      "poisson.toml");
+  const ObservationDensity& density = *model.model().density;
+  CHECK(log_density(density, {0}, {0}) == 0);  // certain
+  CHECK(log_density(density, {3}, {0}) == -std::numeric_limits<double>::infinity());
+  CHECK(log_density(density, {3}, {2}) == Approx(3 * std::log(2.0) - 2 - std::log(6.0)).epsilon(1e-15));
+  CHECK(std::isnan(value_of(model, "(m - 1)*log(m - 1)", {1})));
 }
 
 TEST_CASE("decimal numbers reach the tape as the nearest double") {

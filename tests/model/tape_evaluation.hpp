@@ -29,25 +29,11 @@ inline Columns evaluate(const TapeKernel& kernel, const Tape& tape, const Column
 
 inline bool same_bytes(double a, double b) { return std::memcmp(&a, &b, sizeof a) == 0; }
 
-/// The operations of one argument.
-inline constexpr Op unary_operations[] = {Op::negate,
-                                          Op::absolute,
-                                          Op::sign,
-                                          Op::step,
-                                          Op::square_root,
-                                          Op::exponential,
-                                          Op::logarithm,
-                                          Op::sine,
-                                          Op::cosine,
-                                          Op::tangent,
-                                          Op::hyperbolic_sine,
-                                          Op::hyperbolic_cosine,
-                                          Op::hyperbolic_tangent,
-                                          Op::arctangent,
-                                          Op::error_function,
-                                          Op::error_function_complement};
-inline constexpr Op binary_operations[] = {Op::add,   Op::subtract, Op::multiply, Op::divide,
-                                           Op::power, Op::minimum,  Op::maximum};
+/// The operations of one argument, and of two.
+#define X(name, ...) Op::name,
+inline constexpr Op unary_operations[] = {WIENERTREE_TAPE_UNARY(X) WIENERTREE_ELEMENTARY_FUNCTIONS(X)};
+inline constexpr Op binary_operations[] = {WIENERTREE_TAPE_BINARY(X)};
+#undef X
 
 /// Numbers where elementary functions change their course: ends of ranges, signed zeros, subnormals,
 /// infinities, NaN.

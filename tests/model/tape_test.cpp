@@ -5,6 +5,7 @@
 
 #include "allocations.hpp"
 #include "model/tape_evaluation.hpp"
+#include "wienertree/model/dual.hpp"
 
 using namespace wienertree;
 using namespace wienertree::test;
@@ -197,6 +198,19 @@ struct Local {
   double da = 0, db = 0, distance = inf, k = 8;
 };
 
+double slope(Op op, double a) {
+  const Dual<double, 1> x(a, {1});
+  switch (op) {
+#define X(operation, name, ...) \
+  case Op::operation:           \
+    if constexpr (Op::operation != Op::trigamma) return name(x).slopes[0];
+    WIENERTREE_ELEMENTARY_FUNCTIONS(X)
+#undef X
+    default:
+      return op == Op::trigamma ? 1 : 0;  // above 2.5 it is less steep than that
+  }
+}
+
 Local local(Op op, double a, double b) {
   const double z = apply(op, a, b);
   switch (op) {
@@ -244,6 +258,25 @@ Local local(Op op, double a, double b) {
       return {1.13};
     case Op::error_function_complement:
       return {1.13 * std::exp(-a * a) * (1 + 1e-2)};
+    case Op::where:
+    case Op::unless:
+      return {0, 1, std::abs(a)};
+    case Op::arcsine:
+    case Op::arccosine:
+    case Op::inverse_hyperbolic_tangent:
+      return {slope(op, a), 0, 1 - std::abs(a)};
+    case Op::inverse_hyperbolic_cosine:
+      return {slope(op, a), 0, a - 1};
+    case Op::logarithm_of_one_plus:
+      return {slope(op, a), 0, a + 1};
+    case Op::inverse_hyperbolic_sine:
+    case Op::exponential_minus_one:
+    case Op::normal_distribution:
+      return {slope(op, a)};
+    case Op::logarithm_of_gamma:  // singular at 0, -1, ..; in units in the last place poor at its zeros
+    case Op::digamma:
+    case Op::trigamma:
+      return {slope(op, a), 0, a - 2.5};
   }
   return {};
 }

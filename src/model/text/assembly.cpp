@@ -140,7 +140,7 @@ class Assembly {
       TapeSymbols symbols = states.symbols();
       for (std::size_t i = 0; i < bound_.observation_components; ++i)
         symbols.observations.push_back(builder.uniform(i));
-      const TapeBuilder::Value output = emit(*bound_.log_likelihood, symbols, builder);
+      const TapeBuilder::Value output = emit(*bound_.log_likelihood, symbols, builder, ZeroLogZero::zero);
       model_.density = make_tape_density(builder.finish(std::span(&output, 1)),
                                          observation.log_likelihood->location.text());
       return;

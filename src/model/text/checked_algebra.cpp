@@ -7,6 +7,8 @@
 #include <cmath>
 #include <cstdlib>
 
+#include "wienertree/model/text/function_names.hpp"
+
 namespace wienertree::text {
 
 namespace {
@@ -92,7 +94,11 @@ ex applied(Op function, const std::vector<ex>& arguments) {
     if (function == Op::square_root && x.is_negative())
       throw AlgebraError("sqrt of a negative number", fmt::format("{}", x.to_double()));
   }
-  return apply_symbolically(function, arguments);
+  const ex result = apply_symbolically(function, arguments);
+  // Of numbers GiNaC gives asin(2) and the like as complex numbers.
+  if (is_exactly_a<numeric>(result) && !ex_to<numeric>(result).is_real())
+    throw AlgebraError(fmt::format("{} has no real value here", function_name(function)));
+  return result;
 }
 
 }  // namespace wienertree::text

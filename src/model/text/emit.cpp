@@ -8,7 +8,8 @@ namespace {
 
 class Emission {
  public:
-  Emission(const TapeSymbols& symbols, TapeBuilder& builder) : symbols_(symbols), builder_(builder) {}
+  Emission(const TapeSymbols& symbols, TapeBuilder& builder, ZeroLogZero zero_log_zero)
+      : symbols_(symbols), builder_(builder), zero_log_zero_(zero_log_zero) {}
 
   TapeBuilder::Value operator()(Expression e) {
     if (const auto found = done_.find(e); found != done_.end()) return found->second;
@@ -28,6 +29,7 @@ class Emission {
         return is_binary(e->op) ? builder_.binary(e->op, (*this)(e->operands[0]), (*this)(e->operands[1]))
                                 : builder_.unary(e->op, (*this)(e->operands[0]));
       case Node::Kind::product:
+        if (zero_log_zero_ == ZeroLogZero::zero) return limit_of_product(e->operands);
         return fold(Op::multiply, e->operands);
       case Node::Kind::sum:
         return fold(Op::add, e->operands);
@@ -36,6 +38,19 @@ class Emission {
         break;
     }
     return builder_.constant(e->number);
+  }
+
+  // r log(u) as where(r, r log(u)): 0 where r is 0.
+  TapeBuilder::Value limit_of_product(const std::vector<Expression>& factors) {
+    std::vector<Expression> logarithms, others;
+    for (Expression factor : factors) {
+      const bool is_log = factor->kind == Node::Kind::function && factor->op == Op::logarithm;
+      (is_log ? logarithms : others).push_back(factor);
+    }
+    if (logarithms.empty() || others.empty()) return fold(Op::multiply, factors);
+    const TapeBuilder::Value rest = fold(Op::multiply, others);
+    const TapeBuilder::Value product = builder_.binary(Op::multiply, rest, fold(Op::multiply, logarithms));
+    return builder_.binary(Op::where, rest, product);
   }
 
   TapeBuilder::Value fold(Op op, const std::vector<Expression>& operands) {
@@ -47,13 +62,15 @@ class Emission {
 
   const TapeSymbols& symbols_;
   TapeBuilder& builder_;
+  ZeroLogZero zero_log_zero_;
   std::unordered_map<Expression, TapeBuilder::Value> done_;
 };
 
 }  // namespace
 
-TapeBuilder::Value emit(Expression e, const TapeSymbols& symbols, TapeBuilder& builder) {
-  return Emission(symbols, builder)(e);
+TapeBuilder::Value emit(Expression e, const TapeSymbols& symbols, TapeBuilder& builder,
+                        ZeroLogZero zero_log_zero) {
+  return Emission(symbols, builder, zero_log_zero)(e);
 }
 
 }  // namespace wienertree::text

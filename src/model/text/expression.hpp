@@ -91,14 +91,21 @@ double size(Expression e);
 /// Whether a symbol of this role, or this symbol, occurs.
 bool contains(Expression e, Role role);
 bool contains(Expression e, Role role, std::size_t index);
-/// Whether min, max or abs or one of their derivatives occur, so that the expression is not analytic.
+/// Whether min, max, abs, sign, a comparison or `if` occur, so that the expression is not analytic.
 bool is_piecewise(Expression e);
+/// The functions u of the states at whose zeros the expression has kinks or jumps: a - b of min(a, b) and
+/// max(a, b), the arguments of abs, sign and step (a comparison a > b is step(a - b)), the condition of an
+/// `if` where it is not made of comparisons. Each once, in the order of the expression.
+std::vector<Expression> kink_arguments(Expression e, Arena& arena);
 
 /// What the symbols of a bound expression are on a tape.
 struct TapeSymbols {
   std::vector<TapeBuilder::Value> states, observations;
 };
+/// What 0 log(0) is. In log densities of counts, y log(m) - m and the like, it is the limit 0.
+enum class ZeroLogZero { nan, zero };
 /// @pre no parameter occurs in `e`
-TapeBuilder::Value emit(Expression e, const TapeSymbols& symbols, TapeBuilder& builder);
+TapeBuilder::Value emit(Expression e, const TapeSymbols& symbols, TapeBuilder& builder,
+                        ZeroLogZero zero_log_zero = ZeroLogZero::nan);
 
 }  // namespace wienertree::text

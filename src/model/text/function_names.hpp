@@ -13,30 +13,24 @@ struct FunctionName {
   std::size_t arguments;
 };
 
-/// Those a user may write.
-inline constexpr std::array<FunctionName, 14> function_names{{
-    {"exp", Op::exponential, 1},
-    {"log", Op::logarithm, 1},
-    {"sqrt", Op::square_root, 1},
-    {"sin", Op::sine, 1},
-    {"cos", Op::cosine, 1},
-    {"tan", Op::tangent, 1},
-    {"sinh", Op::hyperbolic_sine, 1},
-    {"cosh", Op::hyperbolic_cosine, 1},
-    {"tanh", Op::hyperbolic_tangent, 1},
-    {"atan", Op::arctangent, 1},
-    {"erf", Op::error_function, 1},
+/// Those a user may write, besides if(condition, a, b), which is where(condition, a) + unless(condition, b).
+#define X(operation, name, ...) {#name, Op::operation, 1},
+inline constexpr auto function_names = std::to_array<FunctionName>({
+    WIENERTREE_ELEMENTARY_FUNCTIONS(X)  //
     {"abs", Op::absolute, 1},
+    {"sign", Op::sign, 1},
     {"min", Op::minimum, 2},
     {"max", Op::maximum, 2},
-}};
+});
+#undef X
 
-/// Also names what derivatives bring: the derivative of abs is sign, that of min and max is made of
-/// step(x) = 1 for x > 0, else 0.
+/// Words that are part of the language and cannot be names.
+inline constexpr std::array<std::string_view, 4> reserved_words{"if", "and", "or", "not"};
+
 constexpr std::string_view function_name(Op op) {
   for (const FunctionName& function : function_names)
     if (function.op == op) return function.name;
-  return op == Op::sign ? "sign" : op == Op::step ? "step" : "?";
+  return "?";
 }
 
 }  // namespace wienertree::text

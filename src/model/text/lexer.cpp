@@ -66,7 +66,12 @@ std::vector<Token> tokens(const SourceExpression& source) {
     } else if (is_letter(c)) {
       token.kind = Token::Kind::name;
       while (end < s.size() && (is_letter(s[end]) || is_digit(s[end]))) ++end;
-    } else if (std::string_view("+-*/^(),").find(c) == std::string_view::npos) {
+    } else if (s.substr(i, 2) == "==" || s.substr(i, 2) == "!=") {
+      throw InputError("equality is not part of the language; use <, >, <= and >=", source.at(i).text(),
+                       std::string(s.substr(i, 2)));
+    } else if ((c == '<' || c == '>') && end < s.size() && s[end] == '=') {
+      ++end;
+    } else if (std::string_view("+-*/^(),<>").find(c) == std::string_view::npos) {
       throw InputError("unexpected character in an expression", source.at(i).text(), character_at(s, i));
     }
     token.text = s.substr(i, end - i);

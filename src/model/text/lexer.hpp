@@ -1,5 +1,5 @@
 #pragma once
-/// The words of an expression: numbers, names and the signs + - * / ^ ( ) ,
+/// The words of an expression: numbers, names and the signs + - * / ^ ( ) , < > <= >=
 #include <cstddef>
 #include <string_view>
 #include <vector>
@@ -13,7 +13,9 @@ struct Token {
   Kind kind = Kind::end;
   std::string_view text;   ///< part of the expression's text; empty at the end
   std::size_t offset = 0;  ///< of the first character
-  bool is(char sign) const { return kind == Kind::sign && text.front() == sign; }
+  /// `sign` of one character; `<=` is not `<`.
+  bool is(char sign) const { return kind == Kind::sign && text.size() == 1 && text.front() == sign; }
+  bool is_word(std::string_view word) const { return kind == Kind::name && text == word; }
 };
 
 /// An expression longer than this is refused.

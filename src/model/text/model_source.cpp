@@ -4,6 +4,7 @@
 
 #include <algorithm>
 
+#include "wienertree/model/text/function_names.hpp"
 #include "wienertree/model/text/lexer.hpp"
 #include "wienertree/model/text/model_keys.hpp"
 #include "wienertree/model/text/toml_section.hpp"
@@ -16,6 +17,8 @@ void check_name(const std::string& name, const Location& location) {
   if (!is_identifier(name))
     throw InputError("a name is made of letters, digits and _ and does not start with a digit",
                      location.text(), name.substr(0, 80));
+  if (std::find(reserved_words.begin(), reserved_words.end(), name) != reserved_words.end())
+    throw InputError(fmt::format("'{}' is a word of the language", name), location.text());
   if (name == "t" || name == "pi")
     throw InputError(fmt::format("'{}' is the name of {}", name, name == "t" ? "the time" : "the constant"),
                      location.text());

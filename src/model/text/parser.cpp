@@ -1,5 +1,8 @@
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <set>
+
 #include "wienertree/model/text/checked_algebra.hpp"
 #include "wienertree/model/text/function_names.hpp"
 #include "wienertree/model/text/lexer.hpp"
@@ -35,7 +38,7 @@ class Parser {
 
   ex whole() {
     if (next().kind == Token::Kind::end) fail("empty expression", next());
-    const ex result = sum();
+    const ex result = disjunction();
     if (next().kind != Token::Kind::end) fail_unexpected();
     return result;
   }
@@ -87,6 +90,71 @@ class Parser {
     Parser& parser_;
   };
 
+  // a or b = 1 - (1 - a)(1 - b)
+  ex disjunction() {
+    const Token first = next();
+    ex result = conjunction();
+    while (next().is_word("or")) {
+      const Token word = take();
+      require_condition(result, first, word);
+      const Token second = next();
+      const ex other = conjunction();
+      require_condition(other, second, word);
+      result = condition(algebra(word, [&] { return ex(1 - (1 - result) * (1 - other)); }));
+    }
+    return result;
+  }
+
+  ex conjunction() {
+    const Token first = next();
+    ex result = negation();
+    while (next().is_word("and")) {
+      const Token word = take();
+      require_condition(result, first, word);
+      const Token second = next();
+      const ex other = negation();
+      require_condition(other, second, word);
+      result = condition(algebra(word, [&] { return ex(result * other); }));
+    }
+    return result;
+  }
+
+  ex negation() {
+    if (!next().is_word("not")) return comparison();
+    const Nesting nesting(*this);
+    const Token word = take();
+    const Token operand = next();
+    const ex result = negation();
+    require_condition(result, operand, word);
+    return condition(1 - result);
+  }
+
+  // Remembers that `e` is 0 or 1.
+  const ex& condition(const ex& e) { return *conditions_.insert(e).first; }
+
+  void require_condition(const ex& e, const Token& place, const Token& word) const {
+    if (!conditions_.contains(e) && !e.is_zero() && !e.is_equal(1))
+      fail(fmt::format("'{}' is for comparisons, such as x > 1", word.text), place, std::string(place.text));
+  }
+
+  // a > b is step(a - b), a >= b is 1 - step(b - a).
+  ex comparison() {
+    const ex left = sum();
+    const auto is_comparison = [&] {
+      return next().kind == Token::Kind::sign && (next().text[0] == '<' || next().text[0] == '>');
+    };
+    if (!is_comparison()) return left;
+    const Token sign = take();
+    const ex right = sum();
+    if (is_comparison()) fail("comparisons do not chain; join two of them with 'and'", next());
+    return condition(algebra(sign, [&]() -> ex {
+      const bool greater = sign.text[0] == '>', or_equal = sign.text.size() == 2;
+      const ex difference = greater != or_equal ? left - right : right - left;
+      const ex strict = apply_symbolically(Op::step, {difference});
+      return or_equal ? 1 - strict : strict;
+    }));
+  }
+
   ex sum() {
     const Token first = next();
     GiNaC::exvector terms{product()};
@@ -136,12 +204,15 @@ class Parser {
       return algebra(token, [&] { return exact_number(token.text); });
     }
     if (token.kind == Token::Kind::name) {
+      const auto is_reserved = [&](std::string_view word) { return token.is_word(word) && word != "if"; };
+      if (std::any_of(reserved_words.begin(), reserved_words.end(), is_reserved))
+        fail(fmt::format("'{}' stands between two conditions, or before one", token.text), token);
       take();
       return next().is('(') ? call(token) : named(token);
     }
     if (!token.is('(')) fail_unexpected();
     take();
-    const ex inner = sum();
+    const ex inner = disjunction();
     close(token);
     return inner;
   }
@@ -152,7 +223,32 @@ class Parser {
     take();
   }
 
+  std::vector<ex> call_arguments() {
+    const Token opening = take();
+    std::vector<ex> arguments;
+    if (!next().is(')')) {
+      arguments.push_back(disjunction());
+      while (next().is(',')) {
+        take();
+        arguments.push_back(disjunction());
+      }
+    }
+    close(opening);
+    return arguments;
+  }
+
+  ex choice(const Token& name) {
+    const std::vector<ex> arguments = call_arguments();
+    if (arguments.size() != 3)
+      fail(fmt::format("if takes 3 arguments, a condition and two values, not {}", arguments.size()), name);
+    return algebra(name, [&]() -> ex {
+      return apply_symbolically(Op::where, {arguments[0], arguments[1]}) +
+             apply_symbolically(Op::unless, {arguments[0], arguments[2]});
+    });
+  }
+
   ex call(const Token& name) {
+    if (name.text == "if") return choice(name);
     const FunctionName* function = nullptr;
     for (const FunctionName& candidate : function_names)
       if (candidate.name == name.text) function = &candidate;
@@ -161,18 +257,12 @@ class Parser {
         fail(fmt::format("'{}' is not a function; a product needs its '*'", name.text), name);
       std::vector<std::string> known;
       for (const FunctionName& candidate : function_names) known.emplace_back(candidate.name);
-      fail("unknown function" + suggestion(name.text, known), name, std::string(name.text));
+      known.emplace_back("if");
+      fail(fmt::format("unknown function{}; there are {}", suggestion(name.text, known),
+                       fmt::join(known, " ")),
+           name, std::string(name.text));
     }
-    const Token opening = take();
-    std::vector<ex> arguments;
-    if (!next().is(')')) {
-      arguments.push_back(sum());
-      while (next().is(',')) {
-        take();
-        arguments.push_back(sum());
-      }
-    }
-    close(opening);
+    const std::vector<ex> arguments = call_arguments();
     if (arguments.size() != function->arguments)
       fail(fmt::format("{} takes {} argument{}, not {}", function->name, function->arguments,
                        function->arguments == 1 ? "" : "s", arguments.size()),
@@ -217,6 +307,7 @@ class Parser {
   const SourceExpression& source_;
   const Scope& scope_;
   std::vector<Token> tokens_;
+  std::set<ex, GiNaC::ex_is_less> conditions_;  // parts that are 0 or 1
   std::size_t position_ = 0, depth_ = 0;
 };
 

@@ -78,6 +78,9 @@ std::string print_sum(const std::vector<Expression>& terms) {
   return result;
 }
 
+// The form that the parser turns into step(u).
+std::string print_step(Expression u) { return fmt::format("({} > 0)", print(u)); }
+
 std::string print_at(Expression e, Strength strength) {
   switch (e->kind) {
     case Node::Kind::number: {
@@ -95,6 +98,11 @@ std::string print_at(Expression e, Strength strength) {
       return parenthesised_if(strength == in_power, print_product({e}, negative));
     }
     case Node::Kind::function: {
+      if (e->op == Op::step) return print_step(e->operands[0]);
+      if (e->op == Op::where)
+        return fmt::format("if({}, {}, 0)", print(e->operands[0]), print(e->operands[1]));
+      if (e->op == Op::unless)
+        return fmt::format("if({}, 0, {})", print(e->operands[0]), print(e->operands[1]));
       std::string arguments = print(e->operands[0]);
       for (std::size_t i = 1; i < e->operands.size(); ++i)
         arguments += fmt::format(", {}", print(e->operands[i]));

@@ -30,7 +30,7 @@ struct SmoothedKinks {
   std::vector<Expression> arguments;  ///< u of every kink, without smoothing; equal ones once
 };
 
-/// @pre no parameter, observation, sign or step occurs in `e`
+/// Jumps (sign, comparisons, if) stay as they are. @pre no parameter or observation occurs in `e`
 SmoothedKinks smooth_kinks(Expression e, Arena& arena);
 
 }  // namespace wienertree::text
