@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "wienertree/numeric/error.hpp"
+#include "wienertree/numeric/read_all.hpp"
 
 namespace wienertree::json {
 namespace {
@@ -103,7 +104,8 @@ std::string text_of_file(const std::filesystem::path& file) {
     std::ifstream stream;
     stream.exceptions(std::ios::failbit | std::ios::badbit);
     stream.open(file, std::ios::binary);
-    return {std::istreambuf_iterator<char>(stream), std::istreambuf_iterator<char>()};
+    stream.exceptions(std::ios::badbit);
+    return read_all(stream, largest_text_file, file.string());
   } catch (const std::ios::failure&) {  // thrown by the buffer itself where the file is a directory
     throw InputError("the formula file cannot be read", file.string());
   }

@@ -10,6 +10,7 @@
 #include "wienertree/model/text/assembly.hpp"
 #include "wienertree/model/text/exact_filter.hpp"
 #include "wienertree/model/text/smoothing.hpp"
+#include "wienertree/numeric/read_all.hpp"
 
 namespace wienertree {
 
@@ -23,20 +24,13 @@ struct TextModel::Contents {
 namespace {
 
 std::string read_file(const std::string& path) {
-  constexpr std::size_t largest_model = 16U << 20U;
   std::error_code status;
   if (std::filesystem::is_directory(path, status))
     throw InputError("this is a folder, not a model file", path);
   errno = 0;
   std::ifstream file(path, std::ios::binary);
   if (!file) throw InputError("cannot read the model file", path, std::strerror(errno));
-  std::string contents;
-  std::vector<char> chunk(1U << 16U);
-  while (file.read(chunk.data(), static_cast<std::streamsize>(chunk.size())) || file.gcount() > 0) {
-    contents.append(chunk.data(), static_cast<std::size_t>(file.gcount()));
-    if (contents.size() > largest_model)  // a device, say
-      throw InputError("too large for a model file", path, fmt::format("more than {} bytes", largest_model));
-  }
+  std::string contents = read_all(file, largest_text_file, path);
   if (file.bad()) throw InputError("cannot read the model file", path, std::strerror(errno));
   return contents;
 }

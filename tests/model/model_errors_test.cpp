@@ -187,3 +187,63 @@ TEST_CASE("files that cannot be read") {
     CHECK(error.value() == "No such file or directory");
   }
 }
+
+TEST_CASE("nesting deeper than the TOML library's stack allows is refused by its place") {
+  const auto repeated = [](const std::string& piece, std::size_t times) {
+    std::string text;
+    for (std::size_t i = 0; i < times; ++i) text += piece;
+    return text;
+  };
+  for (const std::size_t parts : {33, 40'000}) {
+    const std::string key = "a" + repeated(".a", parts - 1);
+    for (const std::string& text : {"[" + key + "]\n", "[[" + key + "]]\n", key + " = 1\n",
+                                    "a = { " + key + " = 1 }\n", "\"a\"." + key + " = 1\n"}) {
+      const Error error = error_of("\n" + text);
+      CHECK(error.where() == "m.toml:2");
+      CHECK(error.message() == "a key of more than 32 parts");
+    }
+  }
+  for (const std::string& text : {"a = " + repeated("[", 33) + repeated("]", 33),
+                                  "a = " + repeated("{ b = ", 33), repeated("[", 100'000)})
+    CHECK(error_of("\n\n" + text).message() == "lists and tables nested deeper than 32 levels");
+  // What stands in strings and comments is no nesting, numbers have their points, and limits themselves are kept.
+  const std::string deep = repeated("a.", 50) + repeated("[", 50);
+  for (const std::string& title : {"\"" + deep + "\\\"" + deep + "\"", "'" + deep + "'",
+                                   "\"\"\"" + deep + "\"\n" + deep + "\\\"\"\"\"\"\"",
+                                   "'''" + deep + "\n''" + deep + "'''", "\"m\" # " + deep}) {
+    std::string text = good;
+    CHECK_NOTHROW(parse_model(text.replace(text.find("\"good\""), 6, title), "m.toml"));
+  }
+  CHECK(error_of("a = [" + repeated("1.5, ", 100) + "2.5]\n" + good).message().find("unknown key") == 0);
+}
+
+TEST_CASE("derivatives beyond a limit are refused before they are taken, with what grew") {
+  const auto drift = [](const std::string& expression) {
+    return "name = \"m\"\nconvention = \"ito\"\n[state]\nx = { initial = 1.0 }\n[drift]\nx = "
+           "\"0\"\n[diffusion]\nx = [\"" +
+           expression + "\"]\n";
+  };
+  std::string product = "cos(x)";
+  for (int k = 2; k <= 20; ++k) product += "*cos(" + std::to_string(k) + "*x)";
+  CHECK_NOTHROW(parse_model(drift(product), "m.toml"));
+  for (int k = 21; k <= 150; ++k) product += "*cos(" + std::to_string(k) + "*x)";
+  const Error error = error_of(drift(product));
+  CHECK(error.where().starts_with("m.toml:6:"));  // the drift's correction is made of the diffusion
+  CHECK(error.message().find("the derivative by x of an expression of ") == 0);
+  CHECK(error.message().find("over the limit of 100000: shorten it, its products above all") !=
+        std::string::npos);
+  // Many derivatives, none of them large.
+  std::string states, drifts, diffusions;
+  for (int i = 0; i < 60; ++i) {
+    const std::string name = "x" + std::to_string(i);
+    std::string all = "0";
+    for (int j = 0; j < 60; ++j) all += "+sin(x" + std::to_string(j) + "*" + std::to_string(j + 1) + ")^3";
+    states += name + " = { initial = 1.0 }\n";
+    drifts += name + " = \"" + all + "\"\n";
+    diffusions += name + " = [\"" + all + "\", \"1\"]\n";
+  }
+  CHECK(error_of("name = \"m\"\nconvention = \"ito\"\n[state]\n" + states + "[drift]\n" + drifts +
+                 "[diffusion]\n" + diffusions)
+            .message()
+            .find("grow beyond the limit of 1e+06 in all") != std::string::npos);
+}

@@ -2,6 +2,7 @@
 
 #include "wienertree/model/text/field_expressions.hpp"
 #include "wienertree/model/text/parse_in_place.hpp"
+#include "wienertree/model/text/symbolic_size.hpp"
 
 namespace wienertree::text {
 
@@ -57,6 +58,7 @@ class Derivation {
   void read() {
     d_ = source_.states.size();
     p_ = source_.noise_dimension();
+    limit_jacobians(d_, p_, source_.states.front().location.text());
     for (const SourceExpression& drift : source_.drift) given_drift_.push_back(parse(drift, scope_));
     diffusion_.assign(p_, exvector(d_));
     for (std::size_t i = 0; i < d_; ++i)
@@ -85,7 +87,9 @@ class Derivation {
 
   const SourceExpression& source_of(std::size_t k, std::size_t i) const { return source_.coefficient(k, i); }
 
-  ex derivative(const ex& e, std::size_t l) const { return e.diff(symbols_.state(l)); }
+  ex derivative(const ex& e, std::size_t l, const SourceExpression& place) {
+    return budget_.derivative(e, symbols_.state(l), place);
+  }
 
   // What derivatives leave often cancels when it is expanded: the shorter of the two forms.
   ex simpler(const ex& e) {
@@ -104,7 +108,7 @@ class Derivation {
         for (std::size_t l = 0; l < d_; ++l)
           if (!diffusion_[j][l].is_zero())
             correction[i] += at_place(source_of(j + 1, i), [&]() -> ex {
-              return diffusion_[j][l] * derivative(diffusion_[j][i], l) * numeric(1, 2);
+              return diffusion_[j][l] * derivative(diffusion_[j][i], l, source_of(j + 1, i)) * numeric(1, 2);
             });
     for (std::size_t i = 0; i < d_; ++i)
       correction[i] = at_place(source_of(1, i), [&] { return simpler(correction[i]); });
@@ -142,7 +146,7 @@ class Derivation {
       c.sensor.push_back(converted(sensor_[i], place));
       exvector gradient;
       for (std::size_t l = 0; l < d_; ++l) {
-        gradient.push_back(at_place(place, [&] { return derivative(sensor_[i], l); }));
+        gradient.push_back(at_place(place, [&] { return derivative(sensor_[i], l, place); }));
         c.sensor_gradient.push_back(converted(gradient.back(), place));
       }
       for (std::size_t r = 1; r <= p_; ++r) {
@@ -170,7 +174,8 @@ class Derivation {
       components[m] = at_place(source_of(j, m), [&] {
         ex component = 0;
         for (std::size_t l = 0; l < d_; ++l)
-          component += V_[i][l] * derivative(V_[j][m], l) - V_[j][l] * derivative(V_[i][m], l);
+          component += V_[i][l] * derivative(V_[j][m], l, source_of(j, m)) -
+                       V_[j][l] * derivative(V_[i][m], l, source_of(i, m));
         return simpler(component);
       });
     return components;
@@ -196,12 +201,13 @@ class Derivation {
     return at_place(place, [&] { return Conversion(symbols_, *result_.arena)(e); });
   }
   Expression converted_derivative(const ex& e, std::size_t l, const SourceExpression& place) {
-    return converted(at_place(place, [&] { return simpler(derivative(e, l)); }), place);
+    return converted(at_place(place, [&] { return simpler(derivative(e, l, place)); }), place);
   }
 
   const ModelSource& source_;
   Symbols symbols_;
   Scope scope_;
+  SymbolicBudget budget_;
   std::size_t d_ = 0, p_ = 0;
   exvector given_drift_, ito_drift_, sensor_;
   std::vector<exvector> diffusion_, V_;  // V_j of the source; V_0 .. V_p in Stratonovich form

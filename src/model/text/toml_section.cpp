@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "wienertree/model/text/toml_depth.hpp"
+
 namespace wienertree::text {
 
 namespace {
@@ -50,6 +52,7 @@ std::vector<std::string_view> split_lines(std::string_view text) {
 }
 
 toml::table parse_toml(std::string_view text, const std::string& file) {
+  limit_toml_depth(text, file);
   try {
     return toml::parse(text, file);
   } catch (const toml::parse_error& error) {
