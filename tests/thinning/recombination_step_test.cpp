@@ -1,8 +1,10 @@
 /// One Caratheodory step against its definition, full rank and not; the basis and its Taylor weights.
+#include <algorithm>
 #include <catch2/catch.hpp>
 #include <cmath>
 
 #include "wienertree/numeric/random.hpp"
+#include "wienertree/thinning/recombination/caratheodory.hpp"
 #include "wienertree/thinning/recombination/polynomials.hpp"
 #include "wienertree/thinning/recombination/step.hpp"
 
@@ -160,4 +162,36 @@ TEST_CASE("Basis polynomials are products of Legendre polynomials by degree; Tay
       REQUIRE((position >= group_first && position < group_last));
       if (a >= 6) REQUIRE(weights[a - 6] == Approx(expected_weights[position - 6]).epsilon(1e-14));
     }
+}
+
+// One patch of as many moments as nodes (`--thin levelwise`): the moments are dependent to rounding, and must still
+// cost q^3 log2(n/q). The bound: a step on n = 2q points of rank rho takes rho (2q - rho) n operations for the
+// factorisation, nu (2 rho + f) n for the nu = n - rho null vectors with f further moments, nu^2 (n + f)/2 for the
+// elimination; with f < q/2 that is below 12 q^3 for every rho, and n/q halves at every step but the last.
+TEST_CASE("A step costs q^3, also on moments that are dependent to rounding") {
+  std::vector<double> per_cube;
+  for (const int degree : {8, 12, 16, 22}) {
+    const PolynomialBasis basis(2, degree);
+    const std::size_t q = basis.kept(), n = 3 * q;
+    PatchPoints points;
+    points.reserve(2, n);
+    points.count = n;
+    const RandomStream random{17};
+    std::vector<double> z(2 * n);
+    random.normals(0, z);
+    for (std::size_t j = 0; j < n; ++j) {
+      // Nodes of a flow lie close to a curve.
+      points.z[j] = std::clamp(z[j] / 4, -1.0, 1.0);
+      points.z[n + j] = std::clamp(std::sin(3 * points.z[j]) / 2 + z[n + j] / 400, -1.0, 1.0);
+      points.weight[j] = 1.0 / static_cast<double>(n);
+      points.label[j] = static_cast<std::uint32_t>(j);
+    }
+    Caratheodory reduction;
+    reduction.reduce(basis, std::vector<double>(basis.size() - q, 1.0), points);
+    CHECK(points.count <= q);
+    const auto size = static_cast<double>(q);
+    per_cube.push_back(reduction.operations() / (size * size * size));
+    CHECK(per_cube.back() <= 12 * (1 + std::ceil(std::log2(3.0))));
+  }
+  CHECK(per_cube.back() <= 1.5 * per_cube.front());
 }

@@ -36,6 +36,9 @@ class Caratheodory {
   /// @pre basis.dimension() == points.dimension, points.count >= 1, weights about 1 at most
   double reduce(const PolynomialBasis& basis, std::span<const double> importance, PatchPoints& points);
 
+  /// Multiplications with addition of all steps so far: O(q^3) each.
+  double operations() const { return step_.operations(); }
+
  private:
   void group_moments(const PolynomialBasis& basis, const PatchPoints& points, std::size_t groups);
   void keep_groups(PatchPoints& points, std::size_t groups, double smallest);

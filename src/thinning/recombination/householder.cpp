@@ -100,32 +100,4 @@ WIENERTREE_CLONES void integrate_further(double* null, std::size_t nullity, std:
   }
 }
 
-void orthogonalise_rows(double* rows, std::size_t count, std::size_t stride) {
-  constexpr int most_sweeps = 40;
-  double largest = 0;
-  for (std::size_t a = 0; a < count; ++a)
-    largest = std::max(largest, dot(rows + a * stride, rows + a * stride, stride));
-  const double noise = largest * epsilon * epsilon;
-  bool rotated = true;
-  for (int sweep = 0; rotated && sweep < most_sweeps; ++sweep) {
-    rotated = false;
-    for (std::size_t a = 0; a < count; ++a)
-      for (std::size_t b = a + 1; b < count; ++b) {
-        double *x = rows + a * stride, *y = rows + b * stride;
-        const double xx = dot(x, x, stride), yy = dot(y, y, stride), xy = dot(x, y, stride);
-        if (std::min(xx, yy) <= noise || std::abs(xy) <= 4 * epsilon * std::sqrt(xx * yy)) continue;
-        rotated = true;
-        const double cotangent = (yy - xx) / (2 * xy);
-        const double t =
-            std::copysign(1 / (std::abs(cotangent) + std::sqrt(1 + cotangent * cotangent)), cotangent);
-        const double c = 1 / std::sqrt(1 + t * t), s = c * t;
-        for (std::size_t i = 0; i < stride; ++i) {
-          const double u = x[i];
-          x[i] = c * u - s * y[i];
-          y[i] = s * u + c * y[i];
-        }
-      }
-  }
-}
-
 }  // namespace wienertree::recombination

@@ -24,8 +24,4 @@ void last_columns(const double* v, const double* scale, std::size_t rank, std::s
 void integrate_further(double* null, std::size_t nullity, std::size_t null_stride, std::size_t stride,
                        const double* further, std::size_t count);
 
-/// Rotates rows against each other until they are orthogonal, U = V Sigma W^T becoming Sigma W^T (Hestenes
-/// 1958, J. Soc. Indust. Appl. Math. 6, 51-90). Rows at rounding level are left alone.
-void orthogonalise_rows(double* rows, std::size_t count, std::size_t stride);
-
 }  // namespace wienertree::recombination

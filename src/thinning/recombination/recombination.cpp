@@ -195,6 +195,12 @@ std::unique_ptr<Thinning> make_levelwise_recombination(int degree) {
   return std::make_unique<Recombination>(degree, false);
 }
 
+double levelwise_bytes(std::size_t dimension, std::size_t nodes) {
+  const auto N = static_cast<double>(nodes);
+  // Moments, their copy that is factorised, and its reflectors, 2N x N each; null vectors 2N x 2N.
+  return dimension > 1 ? 10 * sizeof(double) * N * N : 0;
+}
+
 std::size_t moment_number(std::size_t dimension, int degree, std::size_t cap) {
   // C(d+i, i) = C(d+i-1, i-1) (d+i) / i is exact at each i; growing with i, it may stop at the cap.
   std::uint64_t number = 1;

@@ -37,6 +37,10 @@ std::unique_ptr<Thinning> make_recombination(int degree);
 /// `degree`, if that is less; for d = 1 up to degree 2N - 1), and nothing local. Else as make_recombination.
 std::unique_ptr<Thinning> make_levelwise_recombination(int degree);
 
+/// Bytes that one patch for all sites works with beyond the sites: matrices of 2N points by N moments and of their null
+/// space. Nothing for d = 1, whose patches are Gauss quadratures.
+double levelwise_bytes(std::size_t dimension, std::size_t nodes);
+
 /// The degree chosen for d >= 2 components that vary: the largest r with at least 2 r patches of q nodes, but
 /// at most 5 (d = 2), 3 (d = 3, 4), 2 (d >= 5), beyond which the reduction costs more than further nodes that
 /// do as much for the error; 1 or, with a budget below 1 + d, 0 if no r has that many patches.

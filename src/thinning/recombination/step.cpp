@@ -65,12 +65,7 @@ void CaratheodoryStep::reduce(const double* moments, std::size_t n, std::size_t 
   stride_ = padded(n);
   grow(rows_, kept * stride_);
   std::copy_n(moments, kept * stride_, rows_.data());
-  std::size_t rank = factorise(kept);
-  if (rank < std::min(n, kept)) {
-    std::copy_n(moments, kept * stride_, rows_.data());
-    rank = factorise(principal_combinations(kept));
-  }
-  null_space(moments + kept * stride_, size - kept, rank);
+  null_space(moments + kept * stride_, size - kept, factorise(kept));
   eliminate(weight, discrepancy);
 }
 
@@ -80,25 +75,11 @@ std::size_t CaratheodoryStep::factorise(std::size_t rows) {
   grow(scale_, most);
   grow(norm_, rows);
   grow(norm_reference_, rows);
-  return pivoted_householder(rows_.data(), rows, points_, stride_, reflector_.data(), scale_.data(),
-                             norm_.data(), norm_reference_.data());
-}
-
-/// Leaves in rows_ an orthonormal basis of what the rows span up to rounding; returns their number.
-std::size_t CaratheodoryStep::principal_combinations(std::size_t rows) {
-  orthogonalise_rows(rows_.data(), rows, stride_);
-  double largest = 0;
-  for (std::size_t a = 0; a < rows; ++a) {
-    const double* u = rows_.data() + a * stride_;
-    norm_[a] = std::sqrt(dot(u, u, stride_));
-    largest = std::max(largest, norm_[a]);
-  }
-  std::size_t rank = 0;
-  for (std::size_t a = 0; a < rows; ++a) {
-    if (!(norm_[a] > static_cast<double>(points_) * epsilon * largest)) continue;
-    for (std::size_t i = 0; i < stride_; ++i) rows_[rank * stride_ + i] = rows_[a * stride_ + i] / norm_[a];
-    ++rank;
-  }
+  const std::size_t rank = pivoted_householder(rows_.data(), rows, points_, stride_, reflector_.data(),
+                                               scale_.data(), norm_.data(), norm_reference_.data());
+  // Reflector k passes over the rows behind k, twice.
+  operations_ +=
+      static_cast<double>(rank) * static_cast<double>(2 * rows - rank) * static_cast<double>(stride_);
   return rank;
 }
 
@@ -108,6 +89,7 @@ void CaratheodoryStep::null_space(const double* further_moments, std::size_t fur
   grow(null_, nullity_ * null_stride_);
   last_columns(reflector_.data(), scale_.data(), rank, points_, stride_, null_.data(), null_stride_);
   integrate_further(null_.data(), nullity_, null_stride_, stride_, further_moments, further);
+  operations_ += static_cast<double>(nullity_ * (2 * rank + further)) * static_cast<double>(stride_);
 }
 
 void CaratheodoryStep::eliminate(std::span<double> weight, std::span<double> discrepancy) {
@@ -126,6 +108,7 @@ void CaratheodoryStep::eliminate(std::span<double> weight, std::span<double> dis
     weight[at] = 0;
     for (std::size_t f = 0; f < further; ++f) discrepancy[f] -= s * change[f];
     remove_point(null_.data(), null_stride_, last, at);
+    operations_ += static_cast<double>(last) * static_cast<double>(null_stride_);
   }
 }
 

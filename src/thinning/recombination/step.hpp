@@ -12,11 +12,12 @@ namespace wienertree::recombination {
 /// may be added to the weights without changing sum_j b_aj W_j; the largest multiple that keeps them
 /// non-negative, of either sign, brings one of them to zero (Tchernychova 2015, "Caratheodory cubature
 /// measures", Oxford; Litterer, Lyons 2012, section 2). Here
-/// - the null space is spanned by the last columns of Q in a Householder factorisation with column pivoting
-/// of
-///   the n x q matrix b^T: exact to rounding whatever the condition of b;
-/// - where that shows rank rho < q, the moments are first replaced by their rho principal combinations, by
-///   singular values (Hestenes' one-sided Jacobi method), so that rho points remain and not q;
+/// - the null space is spanned by the last columns of Q in a Householder factorisation with column pivoting of the
+///   n x q matrix b^T: exact to rounding whatever the condition of b;
+/// - where that ends at rank rho < q, no combination of moments that is left exceeds n epsilon times the largest, and
+///   rho points remain. (Moments of a whole generation, of which there are as many as nodes, are always dependent to
+///   rounding from degree 12 or so on. Their rank must cost no more than the factorisation: a singular value
+///   decomposition by rotations, which once stood here, took hundreds of times as long.)
 /// - of the two multiples, the one is taken that keeps the discrepancy of further moments, not kept, smaller.
 /// Buffers are reused from call to call.
 class CaratheodoryStep {
@@ -28,12 +29,15 @@ class CaratheodoryStep {
   void reduce(const double* moments, std::size_t n, std::size_t kept, std::size_t size,
               std::span<double> weight, std::span<double> discrepancy);
 
+  /// Multiplications with addition in all calls so far: at most about 4 n^2 (q + further) each.
+  double operations() const { return operations_; }
+
  private:
   std::size_t factorise(std::size_t rows);
-  std::size_t principal_combinations(std::size_t rows);
   void null_space(const double* further_moments, std::size_t further, std::size_t rank);
   void eliminate(std::span<double> weight, std::span<double> discrepancy);
 
+  double operations_ = 0;
   std::size_t points_ = 0, stride_ = 0;        ///< n, padded(n)
   std::size_t nullity_ = 0, null_stride_ = 0;  ///< null vectors, each followed by its further moments
   std::vector<double> rows_;                   ///< what is factorised: vectors over the points
