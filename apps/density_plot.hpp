@@ -38,8 +38,8 @@ std::vector<DensityPanel> density_panels(const std::vector<std::string>& states,
                                          RugOf rug = RugOf::nodes_of_weight);
 
 /// Panels of one and the same state share the axis.
-/// @returns the bytes of the picture  @throws RunError if gnuplot fails
 /// `width` in pixels: below 640, names of curves stand inside the panel.
+/// @returns the bytes of the picture  @throws RunError if gnuplot fails
 std::string draw_density(Picture picture, const std::string& title, const std::vector<DensityPanel>& panels,
                          int width = 860);
 

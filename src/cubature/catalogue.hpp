@@ -16,9 +16,9 @@ struct CatalogueEntry {
 };
 
 /// Every *.json of the directory, read and verified, ordered by degree, dimension, name.
+///
 /// @throws InputError if the directory cannot be read, a file is not a formula or fails its moments, or two
-/// formulas have
-///   the same name
+///   formulas have the same name
 std::vector<CatalogueEntry> bundled_formulas(const std::filesystem::path& directory);
 
 /// The file of this degree and dimension that promises the least error for a given amount of work; if there

@@ -22,8 +22,8 @@ class CvodeBlock {
   CvodeBlock(const CvodeBlock&) = delete;
   CvodeBlock& operator=(const CvodeBlock&) = delete;
 
-  /// Moves node n in place along the share `lengths[n]` in (0, 1] of the segment D.   x: d x N, N <=
-  /// flow_block. Nodes that fail are appended to `failures`, numbered within x, and become NaN (left_bounds:
+  /// Moves node n in place along the share `lengths[n]` in (0, 1] of segment D. x: d x N, N <= flow_block.
+  /// Nodes that fail are appended to `failures`, numbered within x, and become NaN (left_bounds:
   /// stay where the integration stopped). The others move exactly as if the failed ones were not there.
   void move(std::span<const double> D, std::span<const double> lengths, BatchView x,
             std::vector<NodeFailure>& failures);

@@ -2,8 +2,8 @@
 /// Cubature formulas as JSON files:
 ///
 ///     { "name": "lyons-victoir-5-1", "degree": 5, "dimension": 1, "source": "Lyons, Victoir (2004), ..",
-///       "paths": [ { "weight": 0.1666, "segments": [[0.3333, -0.1993], [0.3333, 2.1306], [0.3333, -0.1993]]
-///       }, .. ] }
+///       "paths": [ { "weight": 0.1666,
+///                    "segments": [[0.3333, -0.1993], [0.3333, 2.1306], [0.3333, -0.1993]] }, .. ] }
 ///
 /// `dimension` is p; a segment is [dw^0, dw^1, .., dw^p]. All keys are required, no other is known.
 #include <filesystem>
@@ -15,9 +15,9 @@
 namespace wienertree {
 
 /// Parses a formula and checks its structure, but not its moments. `where` opens every message (a file name).
+///
 /// @throws InputError for what is not JSON (with line and column), a missing, unknown, repeated or wrongly
-/// typed key, and
-///   whatever check_structure refuses; the message names file, path, segment and key
+///   typed key, and whatever check_structure refuses; the message names file, path, segment and key
 CubatureFormula parse_formula(const std::string& text, const std::string& where);
 
 /// parse_formula on a file. @throws InputError also if the file cannot be read

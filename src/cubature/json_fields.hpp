@@ -12,9 +12,9 @@ namespace wienertree::json {
 
 using Json = nlohmann::json;
 
+/// The text as JSON.
 /// @throws InputError at `where` with line and column if the text is not JSON, has a key twice in an object,
-/// a number too
-///   large for double, or is nested deeper than any formula
+///   a number too large for double, or is nested deeper than any formula
 Json parse(const std::string& text, const std::string& where);
 
 /// The value as JSON, cut to 40 characters.

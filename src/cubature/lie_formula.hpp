@@ -69,8 +69,8 @@ TensorSeries signature(const LieElement& element, int p, int degree);
 /// sum_j lambda_j exp(L_j). @throws InputError as GradedWords
 TensorSeries mean_signature(const LieFormula& formula, int degree);
 
-/// As for formulas of paths: degree and dimension >= 1, positive finite weights, finite coefficients, letters
-/// <= p.
+/// As for formulas of paths: degree and dimension >= 1, positive finite weights, finite coefficients,
+/// letters <= p.
 /// @throws InputError naming element and term, numbered from 1
 void check_structure(const LieFormula& formula, const std::string& where);
 

@@ -2,9 +2,9 @@
 /// Formulas of Lie polynomials as JSON files:
 ///
 ///     { "kind": "lie", "name": "..", "degree": 5, "dimension": 1, "source": "..",
-///       "elements": [ { "weight": 0.6666, "terms": [ { "bracket": "0", "coefficient": 1 },
-///                                                    { "bracket": "[[0,1],1]", "coefficient": 0.25 } ] }, ..
-///                                                    ] }
+///       "elements": [ { "weight": 0.6666,
+///                       "terms": [ { "bracket": "0", "coefficient": 1 },
+///                                  { "bracket": "[[0,1],1]", "coefficient": 0.25 } ] }, .. ] }
 ///
 /// All keys are required, no other is known.
 #include <filesystem>

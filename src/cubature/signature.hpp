@@ -39,9 +39,9 @@ TensorSeries signature(const CubaturePath& path, int degree);
 /// @throws InputError as GradedWords
 TensorSeries mean_signature(const CubatureFormula& formula, int degree);
 
-/// S <- exp(D) (x) S for D = sum_a D_a e_a, D: 1+p values. By Horner, exp(D) S = S + D (S + D/2 (S + D/3 (S +
-/// ..))), whose k-th level is needed only up to degree m - k + 1. `scratch` is resized on first use and holds
-/// nothing between calls.
+/// S <- exp(D) (x) S for D = sum_a D_a e_a, D: 1+p values. By Horner's rule
+///     exp(D) S = S + D (S + D/2 (S + D/3 (S + ..))),
+/// whose k-th level is needed only up to degree m - k + 1. `scratch` holds nothing between calls.
 void multiply_by_exponential_from_left(std::span<const double> D, TensorSeries& S, Eigen::VectorXd& scratch);
 
 /// a (x) b, truncated. @pre a.words == b.words

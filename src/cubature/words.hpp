@@ -18,10 +18,10 @@ int degree_of(std::span<const int> word);
 std::string to_string(std::span<const int> word);
 
 /// All words over {0..p} of degree <= m, numbered by degree and lexicographically within a degree.
-///
 /// A word of degree g is 0v with ||v|| = g - 2 or iv with ||v|| = g - 1, so W_g = W_{g-2} + p W_{g-1} words
-/// have degree g, and the words of degree g are laid out as [0 W_{g-2}-block | 1 W_{g-1}-block | .. | p
-/// W_{g-1}-block]: prefixing a letter to all words of a degree maps a contiguous block to a contiguous block.
+/// have degree g, and the words of degree g are laid out as
+///     [0 W_{g-2}-block | 1 W_{g-1}-block | .. | p W_{g-1}-block]:
+/// prefixing a letter to all words of a degree maps a contiguous block to a contiguous block.
 class GradedWords {
  public:
   using Index = Eigen::Index;

@@ -17,8 +17,8 @@ struct LineGrid {
 /// L* rho = -(b rho)' + (a rho)'' with a = sigma^2/2 as a matrix on densities at the nodes, in conservative
 /// form: row i is -(F_{i+1/2} - F_{i-1/2})/w with the flux at the face between nodes i and i+1
 ///
-///     F = sum_{k=1..m} c_k sum_{l=1-k..k} (b rho)_{i+l} - (1/w) sum_{k=1..m} d_k sum_{l=0..k-1}
-///         ((a rho)_{i+k-l} - (a rho)_{i-l}),
+///     F = sum_{k=1..m} c_k sum_{l=1-k..k} (b rho)_{i+l}
+///         - (1/w) sum_{k=1..m} d_k sum_{l=0..k-1} ((a rho)_{i+k-l} - (a rho)_{i-l}),
 ///     c_k = (-1)^{k+1} m!^2 / (k (m-k)! (m+k)!),   d_k = 2 c_k / k,
 ///
 /// so that away from the ends it is the central difference of order 2m = 8 (Fornberg 1988, Math. Comp. 51,

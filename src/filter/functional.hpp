@@ -8,9 +8,9 @@
 
 namespace wienertree {
 
-/// How the likelihood of the observation over a step [t, t+s] is computed from a node's two ends, h_0 =
-/// h(x_t) and h_1 = h(x_{t+s}); D, I, C, bridge_start, bridge_end as in ObservationWindow, G = (V_r
-/// h_i)_{i,r} at x_t.
+/// How the likelihood of the observation over a step [t, t+s] is computed from a node's two ends,
+/// h_0 = h(x_t) and h_1 = h(x_{t+s}); D, I, C, bridge_start, bridge_end as in ObservationWindow,
+/// G = (V_r h_i)_{i,r} at x_t.
 ///  - picard (order 1):     log w = h_0.D - (s/2)|h_0|^2
 ///  - trapezoid (order 1):  log w = 1/2 (h_0 + h_1).D - (s/6)(|h_0|^2 + h_0.h_1 + |h_1|^2)
 ///  - second_order:         log w = h_0.D + (h_1 - h_0).I/s - (s/6)(|h_0|^2 + h_0.h_1 + |h_1|^2)
@@ -19,14 +19,14 @@ namespace wienertree {
 ///      R = (s^3/45) (h_0 h_0^T + h_1 h_1^T) + (7 s^3/360) (h_0 h_1^T + h_1 h_0^T),
 ///      theta = 1 / (1 + (s^2/pi^2) |G|^2).
 /// `picard` is the functional of Picard (1984) and of Crisan and Ghazali (2007).
-///
 /// `second_order` is the mean, given the two ends, of exp(int h.dY - 1/2 int |h|^2) for h = l + G b, l linear
-/// from h_0 to h_1 and b a Brownian bridge. That mean is exp(int l.dY - 1/2 int |l|^2 + 1/2 Var(int (G b).(dY
-/// - l du)) - 1/2 int E|G b|^2) up to terms of fourth degree in s: C, c and R are the covariances of int b dY
-/// and int b l du, and s^2/6 = int E b^2. Where h is linear and G constant its local error is O(s^4); else
-/// terms of h's curvature, O(s^{5/2}) and random in sign, remain, and the order is 2. In the exact mean the
-/// covariance operator K of b stands as K (1 + G^T G K)^{-1}: theta, with K's largest eigenvalue s^2/pi^2,
-/// changes log w by O(s^4) and keeps it from growing with |h| when |G| s is large.
+/// from h_0 to h_1 and b a Brownian bridge. That mean is
+///     exp(int l.dY - 1/2 int |l|^2 + 1/2 Var(int (G b).(dY - l du)) - 1/2 int E|G b|^2)
+/// up to terms of fourth degree in s: C, c and R are the covariances of int b dY and int b l du, and
+/// s^2/6 = int E b^2. Where h is linear and G constant its local error is O(s^4); else terms of curvature,
+/// O(s^{5/2}) and random in sign, remain, and the order is 2. The exact mean has K (1 + G^T G K)^{-1} in place
+/// of the covariance operator K of b: theta, with K's largest eigenvalue s^2/pi^2, changes log w by O(s^4) and
+/// keeps it from growing with |h| when |G| s is large.
 enum class FunctionalMethod { picard, trapezoid, second_order };
 
 /// log w = (term of the start) + (term of both ends): the first is computed once for a parent, the second for

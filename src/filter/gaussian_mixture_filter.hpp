@@ -2,13 +2,13 @@
 /// The Gaussian-mixture filter (Crisan, Li 2015, Generalised particle filters with Gaussian mixtures,
 /// Stochastic Process. Appl. 125, 2643-2673): N Gaussians N(v_j, om_j) of weight a_j. Between corrections
 ///
-///     d v_j = V~_0(v_j) dt + sqrt(1 - alpha) sum_r V_r(v_j) dB^{j,r},      om_j(t) = alpha (beta Id + int V
-///     V^T(v_j) ds), a_j = exp(int h(v_j).dY - 1/2 int |h(v_j)|^2 ds),
+///     d v_j = V~_0(v_j) dt + sqrt(1 - alpha) sum_r V_r(v_j) dB^{j,r},
+///     om_j(t) = alpha (beta Id + int V V^T(v_j) ds),     a_j = exp(int h(v_j).dY - 1/2 int |h(v_j)|^2 ds),
 ///
 /// solved by Euler-Maruyama and a functional at the means. At a correction the number of offspring of each
-/// comes from a counting `Thinning`; an offspring's mean is drawn from N(v_j, om_j), its covariance is alpha
-/// beta Id. alpha = 0 is the Euler particle filter; alpha of order N^{-1/2} is the best rate. beta = 0 is the
-/// earlier version, where offspring are Dirac masses; beta > 0 adds the variance alpha beta at each
+/// comes from a counting `Thinning`; an offspring's mean is drawn from N(v_j, om_j), its covariance is
+/// alpha beta Id. alpha = 0 is the Euler particle filter; alpha of order N^{-1/2} is the best rate. beta = 0
+/// is the earlier version, where offspring are Dirac masses; beta > 0 adds the variance alpha beta at each
 /// correction.
 ///
 /// A discrete observation conditions every Gaussian (gaussian_conditioning.hpp): weighing by g(y|v_j) alone

@@ -4,8 +4,8 @@
 ///     dX = (A X + a) dt + B dV,      y_r = H X + c + N(0, diag(R))  at the times of the rows,
 ///
 /// the state discretised without error (Van Loan 1978, IEEE Trans. Autom. Control 23, 395-404). The
-/// components of a row are taken one after the other, as their noises are independent: with prediction N(m,
-/// P) and sensor row g = (h, c_i),
+/// components of a row are taken one after the other, as their noises are independent: with prediction
+/// N(m, P) and sensor row g = (h, c_i),
 ///
 ///     s = h P h^T + R_i,   e = y_i - h m - c_i,   K = P h^T / s,   m <- m + K e,
 ///     P <- (I - K h) P (I - K h)^T + K R_i K^T        (Joseph's form, which keeps P positive)

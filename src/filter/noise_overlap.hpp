@@ -10,8 +10,8 @@ namespace wienertree {
 ///     gaussian        exp(a b / s^2)
 ///     laplace         a, b of one sign, u <= v their |.|/s:   e^u + (e^{-u-v} - e^{2u-v})/3
 ///                     of different signs:                     e^{-u} + e^{-v} - e^{-u-v}
-///     log_chi_square  e^{-(a+b)/2} / sqrt(e^{-a} + e^{-b} - 1), infinite where the root is not of a positive
-///     number student_t       by quadrature
+///     log_chi_square  e^{-(a+b)/2} / sqrt(e^{-a} + e^{-b} - 1), infinite where the radicand is not positive
+///     student_t       by quadrature
 double noise_overlap(const NoiseLaw& law, double a, double b);
 
 /// The same by quadrature (double exponential, Takahasi, Mori 1974) for every law, to about 1e-9 relative.

@@ -7,8 +7,8 @@
 
 namespace wienertree {
 
-/// A square banded matrix: entry (i, j), |i - j| <= half_width, at band[i * (2 half_width + 1) + j - i +
-/// half_width]. Entries outside the matrix are zero.
+/// A square banded matrix: entry (i, j), |i - j| <= half_width, at
+/// band[i * (2 half_width + 1) + j - i + half_width]. Entries outside the matrix are zero.
 struct BandedMatrix {
   std::size_t size = 0, half_width = 0;
   std::vector<double> band;

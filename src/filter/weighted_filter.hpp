@@ -10,8 +10,8 @@
 /// quotient of two models' sigma_n(1) their Bayes factor. If y were noise, sigma_n(1) would have the variance
 /// gamma_n/N with
 ///
-///     gamma_n = E prod lambda(X_j, X_j) - E prod lambda(X_j, X'_j),    lambda(x, xi) = int g(y-h(x))
-///     g(y-h(xi))/g(y) dy,
+///     gamma_n = E prod lambda(X_j, X_j) - E prod lambda(X_j, X'_j),
+///     lambda(x, xi) = int g(y-h(x)) g(y-h(xi)) / g(y) dy,
 ///
 /// X' an independent copy of X (noise_overlap.hpp): infinite for some models after a few observations.
 #include "wienertree/filter/euler_filter.hpp"

@@ -9,11 +9,11 @@
 namespace wienertree {
 
 /// The observation over [start, end]. With U_u = Y_end - Y_u:
-///     increment  D = Y_end - Y_start                                  (k)
-///     integral   I = int_start^end U_u du                             (k)
+///     increment   D = Y_end - Y_start                                  (k)
+///     integral    I = int_start^end U_u du                             (k)
 ///     covariation C = int U_u U_u^T du - I I^T / s,  s = end - start   (k x k, row-major)
-/// and, b a Brownian bridge on [0,s], the covariances of int b dY with int (1 - u/s) b_u du and with int
-/// (u/s) b_u du, which are
+/// and, b a Brownian bridge on [0,s], the covariances of int b dY with int (1 - u/s) b_u du and with
+/// int (u/s) b_u du, which are
 ///     bridge_start = (s/3) I - J_1 + J_2/(2s),   bridge_end = (s/6) I - J_2/(2s),
 ///     J_m = int (u - start)^m U_u du                                   (k each).
 /// All are conditional expectations given the rows: Y between two rows is a Brownian bridge, whose

@@ -1,8 +1,8 @@
 #pragma once
 /// Closed-form flow of affine vector fields.
 ///
-/// On a segment with increments D the node solves dx/du = A x + b with A = sum_k D_k A_k, b = sum_k D_k b_k,
-/// so
+/// On a segment with increments D the node solves dx/du = A x + b with
+/// A = sum_k D_k A_k, b = sum_k D_k b_k, so
 ///
 ///     x(1) = x + E x + g,       [ E  g ]  =  exp [ A  b ]  -  Id ,
 ///                               [ 0  0 ]         [ 0  0 ]

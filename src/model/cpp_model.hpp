@@ -9,8 +9,8 @@
 ///         return {r * x[0], kappa * (theta - x[1])};
 ///       }
 ///       template <class T>
-///       Diffusion<T> diffusion(const State<T>& x) const {             // a row per component, a column per
-///       B^j
+///       Diffusion<T> diffusion(const State<T>& x) const {
+///         // a row for each component, a column for each B^j
 ///         const T v = sqrt(x[1]);
 ///         return {{{v * x[0], 0.0}, {rho * xi * v, std::sqrt(1 - rho * rho) * xi * v}}};
 ///       }

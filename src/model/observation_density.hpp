@@ -12,8 +12,8 @@ namespace wienertree {
 ///
 ///     gaussian        exp(-v^2/(2 sd^2)) / (sd sqrt(2 pi))
 ///     laplace         exp(-|v|/scale) / (2 scale)
-///     student_t       Gamma((n+1)/2) / (Gamma(n/2) sqrt(n pi) scale) (1 + v^2/(n scale^2))^(-(n+1)/2),  n =
-///     dof log_chi_square  exp((v - e^v)/2) / sqrt(2 pi), the law of log Z^2 for Z standard normal
+///     student_t       Gamma((n+1)/2) / (Gamma(n/2) sqrt(n pi) scale) (1 + v^2/(n scale^2))^(-(n+1)/2), n=dof
+///     log_chi_square  exp((v - e^v)/2) / sqrt(2 pi), the law of log Z^2 for Z standard normal
 struct NoiseLaw {
   enum class Kind { gaussian, laplace, student_t, log_chi_square };
   Kind kind = Kind::gaussian;
@@ -31,8 +31,8 @@ std::unique_ptr<ObservationDensity> make_additive_noise(std::shared_ptr<const Ve
                                                         std::vector<NoiseLaw> laws);
 
 /// Log density by a tape: inputs the d states, uniforms y_1 .. y_k, one output. It cannot be sampled from,
-/// nor split when only some components are missing. name: how errors call it, e.g. "model.toml,
-/// observation.log_likelihood"
+/// nor split when only some components are missing. name: how errors call it, e.g.
+/// "model.toml, observation.log_likelihood"
 std::unique_ptr<ObservationDensity> make_tape_density(Tape log_likelihood, std::string name);
 
 }  // namespace wienertree

@@ -7,9 +7,9 @@
 
 namespace wienertree {
 
-/// A task may run on any thread: work must depend on the task only, never on the thread, which is there to
-/// choose scratch memory. A pool of size 1 has no thread of
-/// its own and runs everything in the caller's.
+/// A task may run on any thread: its result must depend on the task only, never on the thread, which is there
+/// to choose scratch memory.
+/// A pool of size 1 has no thread of its own and runs everything in the caller's.
 class ThreadPool {
  public:
   /// @throws InputError if `threads` is 0

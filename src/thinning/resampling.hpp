@@ -5,10 +5,10 @@
 /// - systematic: o_i = [C_i + U] - [C_{i-1} + U], one U (Kitagawa 1996, J. Comput. Graph. Statist. 5, 1-25,
 ///   appendix; Carpenter, Clifford, Fearnhead 1999, IEE Proc. Radar Sonar Navig. 146, 2-7);
 /// - stratified: o_i = number of k = 0..N-1 with C_{i-1} <= k + U_k < C_i (Kitagawa 1996);
-/// - multinomial: o_i = number of k with C_{i-1} <= N U_k < C_i (Gordon, Salmond, Smith 1993, IEE Proc. F
-/// 140,
-///   107-113), the U_k drawn in ascending order by exponential spacings (Devroye 1986, Non-Uniform Random
-///   Variate Generation, section V.3.1);
+/// - multinomial: o_i = number of k with C_{i-1} <= N U_k < C_i (Gordon, Salmond, Smith 1993,
+///   IEE Proc. F 140, 107-113), the U_k drawn in ascending order by exponential spacings
+///   (Devroye 1986, Non-Uniform Random Variate Generation, section V.3.1);
+///
 /// - residual: o_i = [N g_i] + multinomial counts of what remains on the fractions {N g_i} (Liu, Chen 1998,
 ///   J. Amer. Statist. Assoc. 93, 1032-1044).
 ///

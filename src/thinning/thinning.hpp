@@ -31,9 +31,9 @@ constexpr bool recombines(ThinningMethod method) {
          method == ThinningMethod::heavy_first;
 }
 
-/// Order in which the random methods visit the sites: as they lie in the tree, or sorted in space (by x for d
-/// = 1, along a Hilbert curve for d > 1). Spatial order turns an error of N^{-1/2} into about N^{-1} in d
-/// = 1.
+/// Order in which the random methods visit the sites: as they lie in the tree, or sorted in space (by x for
+/// d = 1, along a Hilbert curve for d > 1). Spatial order turns an error of N^{-1/2} into about N^{-1} in
+/// d = 1.
 enum class SiteOrder { tree, spatial };
 
 /// The sites kept, with log-weights of the same total mass as the input. Buffers are reused from call to

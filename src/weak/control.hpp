@@ -57,8 +57,8 @@ double discretisation_estimate(std::span<const double> V, int degree);
 /// rung, with a kernel of order 12, and certainly by 4: 4/3 of the difference are all of it; they count as
 /// discretisation. One rung: nothing is smoothed
 /// @throws InputError if the tolerance is not positive, or there is no formula or rung, or one launch is to
-/// show the error of sampling; RunError if the
-/// tolerance is not reached, with the estimates that were
+///   show the error of sampling
+/// @throws RunError if the tolerance is not reached, with the estimates that were
 ControlledResult weak_to_tolerance(const Model& model, const std::vector<std::vector<BatchFunction>>& rungs,
                                    const WeakRun& run, const WeakTarget& target);
 
