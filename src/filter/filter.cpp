@@ -5,12 +5,14 @@
 #include <cmath>
 
 #include "wienertree/filter/benes_filter.hpp"
+#include "wienertree/filter/component_filter.hpp"
 #include "wienertree/filter/euler_filter.hpp"
 #include "wienertree/filter/gaussian_mixture_filter.hpp"
 #include "wienertree/filter/grid_filter.hpp"
 #include "wienertree/filter/kalman_bucy_filter.hpp"
 #include "wienertree/filter/kalman_filter.hpp"
 #include "wienertree/filter/klv_filter.hpp"
+#include "wienertree/filter/small_matrix.hpp"
 #include "wienertree/filter/weighted_filter.hpp"
 #include "wienertree/tree/tree_size.hpp"
 
@@ -41,6 +43,22 @@ void check_tree_options(const Model& model, const FilterOptions& options) {
                      "ess-threshold", fmt::format("{}", options.ess_threshold));
   if (!(options.memory_limit > 0))
     throw InputError("must be positive", "memory limit", fmt::format("{}", options.memory_limit));
+}
+
+void check_component_options(const Model& model, const FilterOptions& options) {
+  check_node_options(options);
+  if (model.observation != ObservationKind::discrete)
+    throw InputError("components are conditioned on discrete observations", "conditioning", "components");
+  const std::size_t d = model.reported_dimension();
+  if (d < 2 || d > static_cast<std::size_t>(most_component_states))
+    throw InputError(fmt::format("components are kept for 2 to {} states", most_component_states),
+                     "conditioning", fmt::format("{} states", d));
+  for (std::size_t i = 0; i < d; ++i)
+    if (model.bounds[i].bounded() && model.bounds[i].boundary == Boundary::absorb)
+      throw InputError("no Gaussian is absorbed at a bound: use conditioning children", "conditioning",
+                       model.state_names[i]);
+  if (!(options.substep_tolerance > 0))
+    throw InputError("must be positive", "substep tolerance", fmt::format("{}", options.substep_tolerance));
 }
 
 void check_particle_options(const FilterOptions& options) {
@@ -93,6 +111,10 @@ std::unique_ptr<Filter> make_filter(const Model& model, const FilterOptions& opt
     case FilterMethod::grid:
       return std::make_unique<GridFilter>(model, options);
     case FilterMethod::klv:
+      if (options.conditioning == Conditioning::components) {
+        check_component_options(model, options);
+        return std::make_unique<ComponentFilter>(model, options);
+      }
       check_tree_options(model, options);
       return std::make_unique<KlvFilter>(model, options);
     case FilterMethod::euler:
