@@ -33,7 +33,7 @@ struct LagrangeWeights {
 // distance from the first node in cells.
 LagrangeWeights lagrange(const LineGrid& grid, double x) {
   const double place = (x - grid.lower) / grid.width - 0.5;
-  const double lowest = std::floor(place) - (stencil / 2 - 1);
+  const double lowest = std::isfinite(place) ? std::floor(place) - (stencil / 2 - 1) : 0.0;
   LagrangeWeights out{};
   out.first = static_cast<std::size_t>(std::clamp(lowest, 0.0, static_cast<double>(grid.cells - stencil)));
   const double z = place - static_cast<double>(out.first);

@@ -1,5 +1,7 @@
 #include "wienertree/filter/kalman_bucy_filter.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -87,6 +89,11 @@ void KalmanBucyFilter::pass_gap(double length, const Eigen::VectorXd& slope) {
   const double start = elapsed_;
   for (double passed = 0; passed < length;) {
     const double rest = length - passed, parts = std::ceil(rest * rate() / longest_step);
+    // Some 10 seconds; and far beyond, a part would be lost in the rounding of the time.
+    constexpr double most_parts = 1e7;
+    if (!(parts <= most_parts))
+      throw RunError("the filter's own time scale is too short for the gap between two rows",
+                     fmt::format("t = {:g}", elapsed_), fmt::format("{:g} steps", parts));
     const double s = parts > 1 ? rest / parts : rest;
     gauss_step(s, slope);
     passed = parts > 1 ? passed + s : length;

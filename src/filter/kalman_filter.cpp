@@ -26,6 +26,9 @@ double norm_1(const Eigen::MatrixXd& M) { return M.cwiseAbs().colwise().sum().ma
 
 LinearTransition linear_transition(const LinearGaussianModel& model, double s) {
   const Eigen::Index d = model.A.rows();
+  if (const double size = norm_1(model.A) * s; !std::isfinite(size))
+    throw RunError("the drift over a step is beyond what a double represents", "linear transition",
+                   fmt::format("{} over a step of {}", norm_1(model.A), s));
   Eigen::MatrixXd affine = Eigen::MatrixXd::Zero(d + 1, d + 1);
   affine.topLeftCorner(d, d) = s * model.A;
   affine.topRightCorner(d, 1) = s * model.a;

@@ -49,7 +49,9 @@ class AtomQuantiles {
   AtomQuantiles(std::span<const double> x, std::span<const double> weight) : x_(x), weight_(weight) {
     const Range range = range_of(x);
     low_ = range.low;
-    scale_ = range.high > range.low ? static_cast<double>(buckets) / (range.high - range.low) : 0.0;
+    const double width = range.high - range.low, scale = static_cast<double>(buckets) / width;
+    // Where width or scale overflow (atoms of both signs near 1e308, or all within 1e-305) all share a bucket.
+    scale_ = std::isfinite(width) && std::isfinite(scale) ? scale : 0.0;
     for (std::size_t n = 0; n < x.size(); ++n) mass_[bucket(x[n])] += weight[n];
   }
 
@@ -68,8 +70,9 @@ class AtomQuantiles {
   };
 
   std::size_t bucket(double x) const {
-    return static_cast<std::size_t>(
-        std::min(static_cast<std::int64_t>((x - low_) * scale_), std::int64_t{buckets - 1}));
+    // In this order what is not a number, as 0 times infinity, is 0.
+    const double position = std::max(0.0, (x - low_) * scale_);
+    return static_cast<std::size_t>(static_cast<std::int64_t>(std::min(buckets - 1.0, position)));
   }
 
   // The bucket where the cumulated weight passes the level, with its non-empty neighbours: the midpoints that
@@ -103,7 +106,9 @@ class AtomQuantiles {
       const double middle = before + a.weight / 2;
       if (middle >= level) {
         if (previous_level < 0) return a.x;
-        return previous_x + (a.x - previous_x) * (level - previous_level) / (middle - previous_level);
+        if (const double gap = a.x - previous_x; std::isfinite(gap))
+          return previous_x + gap * (level - previous_level) / (middle - previous_level);
+        return std::lerp(previous_x, a.x, (level - previous_level) / (middle - previous_level));
       }
       previous_x = a.x;
       previous_level = middle;
@@ -169,7 +174,9 @@ void Marginal::merge(std::vector<Family>& families) {
   const double low = mean - 8 * std::sqrt(second), width = 16 * std::sqrt(second) / most_gaussians;
   std::vector<Family> cells(most_gaussians, {0, 0, 0});
   for (const Family& f : families) {
-    const double position = width > 0 ? std::clamp((f.mean - low) / width, 0.0, most_gaussians - 1.0) : 0.0;
+    const double position = width > 0 && std::isfinite(width) && std::isfinite(f.mean)
+                                ? std::clamp((f.mean - low) / width, 0.0, most_gaussians - 1.0)
+                                : 0.0;
     Family& cell = cells[static_cast<std::size_t>(position)];
     cell.weight += f.weight;
     cell.mean += f.weight * (f.mean - mean);

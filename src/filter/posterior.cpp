@@ -1,11 +1,14 @@
 #include "wienertree/filter/posterior.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <array>
 #include <cmath>
 
 #include "wienertree/filter/marginal.hpp"
 #include "wienertree/numeric/clones.hpp"
+#include "wienertree/numeric/error.hpp"
 #include "wienertree/numeric/lane_sum.hpp"
 #include "wienertree/numeric/log_weights.hpp"
 
@@ -31,6 +34,13 @@ WIENERTREE_CLONES double weighted_sum(const double* w, const double* x, std::siz
 WIENERTREE_CLONES double weighted_products(const double* w, const double* x, double x0, const double* y,
                                            double y0, std::size_t n) {
   return lane_sum(0, n, [&](std::size_t k) { return w[k] * ((x[k] - x0) * (y[k] - y0)); });
+}
+
+// A number that overflowed must not be handed out as a result.
+void require_finite(double value, const Posterior& posterior, const std::string& what) {
+  if (std::isfinite(value)) return;
+  throw RunError("is not a finite number: it lies beyond what a double represents, or the model explodes",
+                 fmt::format("t = {:g}, {}", posterior.time, what), fmt::format("{}", value));
 }
 
 }  // namespace
@@ -75,6 +85,8 @@ void summarise(const Posterior& posterior, std::size_t components, int highest_m
   out.log_evidence = posterior.log_evidence;
   out.ess = effective_sample_size(posterior);
   out.nodes = posterior.kept;
+  require_finite(out.log_evidence, posterior, "log evidence");
+  require_finite(out.ess, posterior, "effective sample size");
   for (auto* v : {&out.mean, &out.sd, &out.q05, &out.q50, &out.q95}) v->resize(components);
   out.moments.resize(highest_moment >= 2 ? components : 0);
   for (std::size_t i = 0; i < components; ++i) {
@@ -85,9 +97,18 @@ void summarise(const Posterior& posterior, std::size_t components, int highest_m
     out.q05[i] = q[0];
     out.q50[i] = q[1];
     out.q95[i] = q[2];
+    const auto require = [&](double value, const std::string& name) {
+      require_finite(value, posterior, fmt::format("{} of state {}", name, i + 1));
+    };
+    require(out.mean[i], "mean");
+    require(out.sd[i], "standard deviation");
+    for (const double quantile : q) require(quantile, "quantile");
     if (highest_moment < 2) continue;
     out.moments[i].clear();
-    for (int k = 2; k <= highest_moment; ++k) out.moments[i].push_back(raw_moment(posterior, i, k));
+    for (int k = 2; k <= highest_moment; ++k) {
+      out.moments[i].push_back(raw_moment(posterior, i, k));
+      require(out.moments[i].back(), fmt::format("moment {}", k));
+    }
   }
 }
 

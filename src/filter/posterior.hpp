@@ -47,6 +47,7 @@ struct PosteriorSummary {
 void exchange(StateArchive& archive, PosteriorSummary& summary);
 
 /// @param components how many states to report, @param highest_moment K, 0 or 1 for none
+/// @throws RunError naming time and state where a number is not finite
 void summarise(const Posterior& posterior, std::size_t components, int highest_moment, PosteriorSummary& out);
 
 }  // namespace wienertree

@@ -41,7 +41,7 @@ void exponential_minus_identity(std::span<const double> M, std::size_t m, std::s
   // Halved until its norm is at most 1/2, where the first omitted term is below 2^-17/17! = 2e-20.
   constexpr int terms = 16;
   const double norm = infinity_norm(M, m);
-  const int halvings = norm > 0.5 ? std::max(0, std::ilogb(norm) + 2) : 0;
+  const int halvings = norm > 0.5 && std::isfinite(norm) ? std::max(0, std::ilogb(norm) + 2) : 0;
   const std::span<double> power = scratch.subspan(0, m * m), next = scratch.subspan(m * m, m * m);
   const double scale = std::ldexp(1.0, -halvings);
   // Horner: F = M (Id + M/2 (Id + M/3 (..)))

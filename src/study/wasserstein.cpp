@@ -59,7 +59,8 @@ class Difference {
       low = std::min(low, atom.x);
       high = std::max(high, atom.x);
     }
-    const double asked = std::ceil((high - low) / narrowest * 100);
+    // In this order a quotient that is not a number asks for one cell.
+    const double asked = std::max(1.0, std::ceil((high - low) / narrowest * 100));
     const auto cells = static_cast<std::size_t>(std::min(asked, static_cast<double>(most_cells)));
     std::vector<double> cuts;
     for (std::size_t c = 0; c <= cells; ++c)

@@ -51,7 +51,8 @@ void live_sites(std::span<const double> log_weight, WalkFrom walk_from, ThreadPo
 
 inline std::uint64_t cell(double x, double low, double scale, double cells) {
   const double position = (0.25 * x - low) * (scale * cells);
-  return static_cast<std::uint64_t>(static_cast<std::int64_t>(std::min(std::max(position, 0.0), cells - 1)));
+  // In this order what is not a number, as 0 times infinity where all sites lie within 1e-305, is cell 0.
+  return static_cast<std::uint64_t>(static_cast<std::int64_t>(std::min(std::max(0.0, position), cells - 1)));
 }
 
 constexpr auto as_stored = [](std::size_t first) { return [i = first]() mutable { return i++; }; };

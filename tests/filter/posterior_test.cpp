@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <catch2/catch.hpp>
 #include <cmath>
+#include <limits>
 #include <numeric>
 
 #include "wienertree/filter/marginal.hpp"
@@ -67,6 +68,62 @@ TEST_CASE("quantiles of atoms equal those of the sorted definition") {
         CHECK(q[i] == Approx(sorted_quantile(m, levels[i])).epsilon(1e-9));
       }
     }
+}
+
+TEST_CASE("quantiles of atoms at the ends of the range of doubles equal those of the sorted definition") {
+  constexpr double inf = std::numeric_limits<double>::infinity(), tiny = 5e-324, huge = 1.7e308;
+  const std::vector<std::vector<double>> places = {
+      {0, tiny},                       // the width's reciprocal overflows
+      {0, tiny, 3 * tiny, 1e-320},     // nodes of an extinct population
+      {-huge, 0, huge},                // the width overflows
+      {-huge, -1, 1, huge, 1e308, 5},  // the same, with atoms between
+      {tiny, tiny},
+      {huge, huge, huge}};
+  for (const std::vector<double>& x : places) {
+    Measure m{Batch(1, x.size()), std::vector<double>(x.size(), 1.0 / static_cast<double>(x.size())), {}};
+    std::copy(x.begin(), x.end(), m.points.component(0).begin());
+    const std::vector<double> levels = {0.05, 0.5, 0.95};
+    std::vector<double> q(levels.size());
+    Marginal(m.posterior(), 0).quantiles(levels, q);
+    std::vector<double> sorted = x;
+    std::sort(sorted.begin(), sorted.end());
+    for (std::size_t i = 0; i < levels.size(); ++i) {
+      INFO("atoms from " << sorted.front() << " to " << sorted.back() << ", level " << levels[i]);
+      CHECK((q[i] >= sorted.front() && q[i] <= sorted.back()));
+      // Midpoints (k + 1/2)/n of the distribution function, linear between; halves do not overflow.
+      const double position =
+          std::clamp(levels[i] * static_cast<double>(x.size()) - 0.5, 0.0, static_cast<double>(x.size() - 1));
+      const auto k = std::min(static_cast<std::size_t>(position), x.size() - 1);
+      const double f = position - static_cast<double>(k), above = sorted[std::min(k + 1, x.size() - 1)];
+      const double half = sorted[k] / 2 * (1 - f) + above / 2 * f;
+      // Subnormal numbers are multiples of 5e-324, each of the two sums rounds to one.
+      CHECK(std::fabs(q[i] / 2 - half) <= 1e-12 * std::fabs(half) + 2 * tiny);
+    }
+  }
+  // A node that was dropped may have a state that is no number, and has no weight.
+  Measure m{Batch(1, 3), {0.5, 0, 0.5}, {}};
+  m.points(0, 0) = 1;
+  m.points(0, 1) = std::numeric_limits<double>::quiet_NaN();
+  m.points(0, 2) = 2;
+  std::vector<double> q(1);
+  Marginal(m.posterior(), 0).quantiles(std::vector{0.5}, q);
+  CHECK(q[0] == Approx(1.5));
+  m.points(0, 1) = inf;
+  Marginal(m.posterior(), 0).quantiles(std::vector{0.5}, q);
+  CHECK(q[0] == Approx(1.5));
+}
+
+TEST_CASE("a summary that would hold a number that is not finite is refused, with time and state") {
+  Measure m{Batch(2, 2), {0.5, 0.5}, {}};
+  m.points(1, 0) = -1.7e308;
+  m.points(1, 1) = 1.7e308;
+  Posterior p = m.posterior();
+  p.time = 3;
+  PosteriorSummary s;
+  CHECK_THROWS_WITH(summarise(p, 2, 0, s), Catch::Contains("t = 3, standard deviation of state 2") &&
+                                               Catch::Contains("not a finite number"));
+  p.log_evidence = std::numeric_limits<double>::quiet_NaN();
+  CHECK_THROWS_WITH(summarise(p, 2, 0, s), Catch::Contains("log evidence"));
 }
 
 TEST_CASE("moments, quantiles and density of a Gaussian sum agree with quadrature") {
