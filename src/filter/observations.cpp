@@ -1,6 +1,7 @@
 #include "wienertree/filter/observations.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <charconv>
 #include <cmath>
@@ -8,6 +9,8 @@
 #include <limits>
 #include <ostream>
 #include <string_view>
+
+#include "wienertree/numeric/memory.hpp"
 
 namespace wienertree {
 namespace {
@@ -37,6 +40,17 @@ std::string shown(std::string_view text) {
 
 std::string column_name(std::size_t column) { return column == 0 ? "t" : fmt::format("y{}", column); }
 
+std::vector<std::string> column_names(std::size_t dimension) {
+  std::vector<std::string> names;
+  for (std::size_t column = 0; column <= dimension; ++column) names.push_back(column_name(column));
+  return names;
+}
+
+// Whether a number may have been cut off behind this: 0.4, of which "0." is left.
+bool looks_cut_off(std::string_view field) {
+  return field.empty() || std::string_view(".eE+-").find(field.back()) != std::string_view::npos;
+}
+
 void require_rows(std::size_t rows, const std::string& origin, ObservationKind kind) {
   if (rows == 0) throw InputError("there are no rows", origin);
   if (kind == ObservationKind::continuous && rows < 2)
@@ -52,42 +66,59 @@ void ObservationPath::append(double time, std::span<const double> value) {
 
 ObservationReader::ObservationReader(std::istream& in, std::string origin, std::size_t dimension,
                                      ObservationKind kind)
+    : ObservationReader(in, std::move(origin), column_names(dimension), kind) {}
+
+ObservationReader::ObservationReader(std::istream& in, std::string origin, std::vector<std::string> columns,
+                                     ObservationKind kind)
     : in_(in),
       origin_(std::move(origin)),
-      dimension_(dimension),
+      columns_(std::move(columns)),
+      buffer_(new char[longest_line + 1]),
+      dimension_(columns_.size() - 1),
       kind_(kind),
       last_time_(-std::numeric_limits<double>::infinity()) {
-  std::string expected = "t";
-  for (std::size_t i = 1; i <= dimension_; ++i) expected += fmt::format(",y{}", i);
-  if (!std::getline(in_, line_))
-    throw in_.bad() ? InputError("reading failed", origin_ + ":1")
-                    : InputError("empty: expected the header " + expected, origin_);
-  ++line_number_;
+  const std::string expected = fmt::format("{}", fmt::join(columns_, ","));
+  if (!read_line()) throw InputError("empty: expected the header " + expected, origin_);
   std::string_view rest = line_;
   if (rest.starts_with("\xef\xbb\xbf")) rest.remove_prefix(3);  // byte order mark of some spreadsheets
   bool last = false;
   for (std::size_t column = 0; !last; ++column) {
     const std::string_view name = take_field(rest, last);
-    if (column > dimension_ || name != column_name(column) || (last && column != dimension_))
+    if (column > dimension_ || name != columns_[column] || (last && column != dimension_))
       throw InputError(fmt::format("the model observes {} component{}: expected the header {}", dimension_,
                                    dimension_ == 1 ? "" : "s", expected),
                        origin_ + ":1", shown(line_));
   }
 }
 
+// The next line, without its end; false at the end of the stream.
+bool ObservationReader::read_line() {
+  in_.getline(buffer_.get(), static_cast<std::streamsize>(longest_line + 1));
+  const auto read = static_cast<std::size_t>(in_.gcount());
+  const std::string where = fmt::format("{}:{}", origin_, line_number_ + 1);
+  if (in_.bad()) throw InputError("reading failed", where);
+  if (in_.eof() && read == 0) return false;
+  if (in_.fail())
+    throw InputError(fmt::format("the line is longer than {} bytes", longest_line), where,
+                     shown({buffer_.get(), read}));
+  ended_ = !in_.eof();
+  line_ = {buffer_.get(), ended_ ? read - 1 : read};
+  ++line_number_;
+  return true;
+}
+
 bool ObservationReader::next(double& t, std::span<double> y) {
   do {
-    if (!std::getline(in_, line_)) {
-      if (in_.bad()) throw InputError("reading failed", fmt::format("{}:{}", origin_, line_number_ + 1));
-      return false;
-    }
-    ++line_number_;
+    if (!read_line()) return false;
   } while (trimmed(line_).empty());
   std::string_view rest = line_;
   const auto fail = [&](const std::string& message, std::size_t column, std::string_view value) {
-    throw InputError(message, fmt::format("{}:{}: column {}", origin_, line_number_, column_name(column)),
+    throw InputError(message, fmt::format("{}:{}: column {}", origin_, line_number_, columns_[column]),
                      shown(value));
   };
+  if (!ended_ && looks_cut_off(trimmed(rest.substr(rest.rfind(',') + 1))))
+    throw InputError("the last row is cut off: it has no end of line, and its last field may go on",
+                     fmt::format("{}:{}", origin_, line_number_), shown(line_));
   bool last = false;
   for (std::size_t column = 0; column <= dimension_; ++column) {
     if (last) fail("the row ends early", column, line_);
@@ -136,11 +167,23 @@ void check_observations(const ObservationRows& rows, const std::string& origin, 
 ObservationPath read_observations(std::istream& in, const std::string& origin, std::size_t dimension,
                                   ObservationKind kind) {
   ObservationReader reader(in, origin, dimension, kind);
+  return read_rows(reader, origin, dimension, kind);
+}
+
+ObservationPath read_rows(ObservationReader& reader, const std::string& origin, std::size_t dimension,
+                          ObservationKind kind) {
+  constexpr std::size_t rows_between_checks = 1 << 16;
   ObservationPath path;
   path.dimension = dimension;
   double t = 0;
   std::vector<double> y(dimension);
-  while (reader.next(t, y)) path.append(t, y);
+  while (reader.next(t, y)) {
+    path.append(t, y);
+    // Vectors hold up to twice their elements, and three times while they grow.
+    if (path.rows() % rows_between_checks == 0)
+      require_memory(3.0 * sizeof(double) * static_cast<double>(path.rows() * (1 + dimension)),
+                     fmt::format("a record of more than {} rows", path.rows()), origin);
+  }
   require_rows(path.rows(), origin, kind);
   return path;
 }

@@ -1,8 +1,10 @@
 #pragma once
 /// Observations as they come in a file: CSV with header `t,y1[,y2..]`, t strictly increasing.
 #include <istream>
+#include <memory>
 #include <span>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "wienertree/model/model.hpp"
@@ -32,20 +34,33 @@ struct ObservationPath {
   void append(double time, std::span<const double> value);
 };
 
+/// A line of an observations file that is longer, in bytes, is refused: a device, or no text.
+inline constexpr std::size_t longest_line = std::size_t{1} << 20;
+
 /// Reads rows one at a time, so that a filter can follow a stream.
 class ObservationReader {
  public:
   /// Reads the header. `origin` names the source in messages.
   /// @throws InputError if the header is not t,y1..yk with k = `dimension`
   ObservationReader(std::istream& in, std::string origin, std::size_t dimension, ObservationKind kind);
+  /// The same of a table whose columns have other names; the first of them is the time.
+  ObservationReader(std::istream& in, std::string origin, std::vector<std::string> columns,
+                    ObservationKind kind);
   /// Reads the next row into t and y (k values); false at the end of the stream.
   /// @throws InputError naming origin, line and column for a wrong number of fields, a field that is not a
-  /// finite number, a time that does not increase, or a missing value where `kind` is continuous
+  /// finite number, a time that does not increase, a missing value where `kind` is continuous, a line longer
+  /// than longest_line, or a last line without its end whose last field looks cut off: empty, or ending in
+  /// a point, an e or a sign
   bool next(double& t, std::span<double> y);
 
  private:
+  bool read_line();
   std::istream& in_;
-  std::string origin_, line_;
+  std::string origin_;
+  std::vector<std::string> columns_;
+  std::unique_ptr<char[]> buffer_;  // longest_line + 1; what is not written is not memory
+  std::string_view line_;           // in buffer_
+  bool ended_ = false;              // whether line_ has its end
   std::size_t dimension_, line_number_ = 0;
   ObservationKind kind_;
   double last_time_;
@@ -59,9 +74,12 @@ void check_observations(const ObservationRows& rows, const std::string& origin, 
 
 /// Reads a whole record from `in`.
 /// @throws InputError as ObservationReader, and if there are fewer than two rows (continuous) or none
-/// (discrete)
+/// (discrete), or more than memory_limit() holds
 ObservationPath read_observations(std::istream& in, const std::string& origin, std::size_t dimension,
                                   ObservationKind kind);
+/// The rows after the header of any reader.
+ObservationPath read_rows(ObservationReader& reader, const std::string& origin, std::size_t dimension,
+                          ObservationKind kind);
 /// Reads a file. @throws InputError also when it cannot be opened
 ObservationPath read_observations(const std::string& path, std::size_t dimension, ObservationKind kind);
 

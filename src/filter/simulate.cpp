@@ -6,8 +6,9 @@
 #include <cmath>
 #include <limits>
 
-#include "wienertree/tree/initial.hpp"
+#include "wienertree/numeric/memory.hpp"
 #include "wienertree/numeric/random.hpp"
+#include "wienertree/tree/initial.hpp"
 
 namespace wienertree {
 namespace {
@@ -77,6 +78,17 @@ Simulation simulate(const Model& model, double horizon, std::size_t steps, std::
   if (steps == 0) throw InputError("must be at least 1", "steps", "0");
   if (keep == 0 || steps % keep != 0)
     throw InputError(fmt::format("must divide the number of steps, {}", steps), "keep", std::to_string(keep));
+  const auto rows = static_cast<double>(keep);
+  if (horizon > std::numeric_limits<double>::max() / rows ||
+      horizon / static_cast<double>(steps) < std::numeric_limits<double>::min())
+    throw InputError(
+        fmt::format("the times of {} steps and {} rows up to it cannot be represented", steps, keep),
+        "horizon", fmt::format("{}", horizon));
+  const auto columns =
+      static_cast<double>(2 + model.reported_dimension() +
+                          (model.observation == ObservationKind::none ? 0 : model.observation_dimension()));
+  // Vectors take up to three times their size while they grow.
+  require_memory(3 * sizeof(double) * columns * rows, fmt::format("a simulation of {} rows", keep), "--keep");
   const auto stream = [&](Purpose purpose) { return RandomStream{seed, launch, 0, purpose}; };
   const double dt = horizon / static_cast<double>(steps);
   const std::size_t every = steps / keep,
@@ -106,6 +118,10 @@ Simulation simulate(const Model& model, double horizon, std::size_t steps, std::
       }
       std::copy(x.begin(), x.end(), before.begin());
     }
+    for (std::size_t i = 0; i < k; ++i)
+      if (!std::isfinite(y[i]) && !(previous && row == 0))
+        throw RunError("the simulated observation is not finite", fmt::format("y{} at t = {:g}", i + 1, t),
+                       fmt::format("{}", y[i]));
     if (k > 0) out.observations.append(t, y);
   };
 

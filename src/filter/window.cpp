@@ -4,8 +4,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "wienertree/filter/row_integrals.hpp"
+#include "wienertree/numeric/memory.hpp"
 
 namespace wienertree {
 namespace {
@@ -32,6 +34,9 @@ ObservationWindows::ObservationWindows(ObservationRows path, ObservationKind kin
     : rows_(path), kind_(kind) {
   const std::span<const double> t = path.times;
   const std::size_t gaps = path.rows() - 1;
+  if (!std::isfinite(t.back() - t.front()))
+    throw InputError("the times lie further apart than a double represents",
+                     fmt::format("observations: row {}, column t", path.rows()), fmt::format("{}", t.back()));
   if (kind == ObservationKind::continuous) {
     if (steps > gaps)
       throw InputError(fmt::format("more steps than the observation has gaps between rows ({})", gaps),
@@ -55,11 +60,22 @@ ObservationWindows::ObservationWindows(ObservationRows path, ObservationKind kin
           "observations: row 1");
     windows_.push_back({t[0], t[0], 0, 0, true, false});
   }
+  // Every gap is cut into as many steps as it holds, or one.
+  require_memory(static_cast<double>(sizeof(Bounds)) * static_cast<double>(std::max(steps, gaps)) * 2,
+                 fmt::format("a record cut into {} steps", std::max(steps, gaps)), "--steps");
   const double longest = steps == 0 ? INFINITY : (t.back() - t.front()) / static_cast<double>(steps);
   for (std::size_t r = 1; r < path.rows(); ++r) {
     const double gap = t[r] - t[r - 1];
     // 1e-9 relative: a gap of exactly `longest` up to rounding is one step.
-    const auto parts = static_cast<std::size_t>(std::max(1.0, std::ceil(gap / longest * (1 - 1e-9))));
+    const double wanted = std::max(1.0, std::ceil(gap / longest * (1 - 1e-9)));
+    // Between two times there are at most as many others as there are doubles.
+    const double spacing = 4 * std::numeric_limits<double>::epsilon() *
+                           std::max(std::fabs(t[r - 1]), std::fabs(t[r])),
+                 shortest = std::max(spacing, std::numeric_limits<double>::min());
+    if (wanted > 1 && !(gap / wanted >= shortest))
+      throw InputError(fmt::format("the gap between these times is too short for {:g} steps", wanted),
+                       fmt::format("observations: row {}, column t", r + 1), fmt::format("{}", t[r]));
+    const auto parts = static_cast<std::size_t>(wanted);
     for (std::size_t i = 1; i <= parts; ++i) {
       const auto at = [&](std::size_t part) {
         return part == parts ? t[r] : t[r - 1] + gap * static_cast<double>(part) / static_cast<double>(parts);

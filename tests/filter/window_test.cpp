@@ -157,3 +157,22 @@ TEST_CASE("discrete observations divide their gaps and weigh where they were mad
                     InputError);
   }
 }
+
+TEST_CASE("times that a double does not tell apart are refused, not repeated") {
+  const auto discrete = [](const ObservationPath& path, std::size_t steps) {
+    return ObservationWindows(path, ObservationKind::discrete, ObservationTiming::current, steps);
+  };
+  CHECK_THROWS_WITH(discrete(path_of({-1e308, 1e308}, {0, 0}), 1),
+                    Catch::Contains("further apart than a double"));
+  CHECK_THROWS_WITH(discrete(path_of({0, 1e-320}, {0, 0}), 100),
+                    Catch::Contains("row 2") && Catch::Contains("too short for 100 steps"));
+  CHECK_THROWS_WITH(discrete(path_of({1e15, 1e15 + 1}, {0, 0}), 100),
+                    Catch::Contains("too short for 100 steps"));
+  CHECK(discrete(path_of({0, 1e-320}, {0, 0}), 1).size() == 2);
+  const ObservationWindows windows = discrete(path_of({1e9, 1e9 + 1}, {0, 0}), 1000);
+  ObservationWindow w;
+  for (std::size_t j = 1; j < windows.size(); ++j) {
+    windows.get(j, w);
+    CHECK(w.length() > 0);
+  }
+}
