@@ -14,6 +14,21 @@ namespace {
 
 using Value = TapeBuilder::Value;
 
+// From this many degrees of freedom on, forms that do not cancel.
+constexpr double many_degrees = 100;
+
+// log of Gamma((n+1)/2) / (Gamma(n/2) sqrt(n pi)). For large a = n/2 by the asymptotic series
+//     log Gamma(a + 1/2) - log Gamma(a) = log(a)/2 - 1/(8 a) + 1/(192 a^3) - 1/(640 a^5) + 17/(14336 a^7) - ..
+// (Abramowitz, Stegun 1964, 6.1.40; the next term is below 1e-19 at a = 50). The difference itself would lose all digits
+// by n = 1e16.
+double log_student_normaliser(double n) {
+  if (n < many_degrees)
+    return std::lgamma(0.5 * (n + 1.0)) - std::lgamma(0.5 * n) - 0.5 * std::log(n * std::numbers::pi);
+  const double b = 2 / n, b2 = b * b;
+  const double series = b * (-1. / 8 + b2 * (1. / 192 + b2 * (-1. / 640 + b2 * (17. / 14336))));
+  return series - 0.5 * std::log(2 * std::numbers::pi);
+}
+
 // log g(v), as in the header.
 Value log_density_of(const NoiseLaw& law, Value v, TapeBuilder& tape) {
   const auto constant = [&](double c) { return tape.constant(c); };
@@ -28,10 +43,10 @@ Value log_density_of(const NoiseLaw& law, Value v, TapeBuilder& tape) {
       return plus(-std::log(2.0 * law.scale), times(-1.0, tape.unary(Op::absolute, z)));
     case NoiseLaw::Kind::student_t: {
       const double n = law.dof;
-      const Value spread =
-          tape.unary(Op::logarithm, plus(1.0, times(1.0 / n, tape.binary(Op::multiply, z, z))));
-      const double log_normaliser = std::lgamma(0.5 * (n + 1.0)) - std::lgamma(0.5 * n) -
-                                    0.5 * std::log(n * std::numbers::pi) - std::log(law.scale);
+      const Value u = times(1.0 / n, tape.binary(Op::multiply, z, z));
+      const Value spread = n < many_degrees ? tape.unary(Op::logarithm, plus(1.0, u))
+                                            : tape.unary(Op::logarithm_of_one_plus, u);
+      const double log_normaliser = log_student_normaliser(n) - std::log(law.scale);
       return plus(log_normaliser, times(-0.5 * (n + 1.0), spread));
     }
     case NoiseLaw::Kind::log_chi_square:
@@ -185,8 +200,7 @@ double log_noise(const NoiseLaw& law, double v) {
       return -std::abs(z) - std::log(2.0 * law.scale);
     case NoiseLaw::Kind::student_t: {
       const double n = law.dof;
-      return std::lgamma(0.5 * (n + 1.0)) - std::lgamma(0.5 * n) - 0.5 * std::log(n * std::numbers::pi) -
-             std::log(law.scale) - 0.5 * (n + 1.0) * std::log1p(z * z / n);
+      return log_student_normaliser(n) - std::log(law.scale) - 0.5 * (n + 1.0) * std::log1p(z * z / n);
     }
     case NoiseLaw::Kind::log_chi_square:
       break;

@@ -19,6 +19,13 @@ std::vector<double> time_grid(GridKind kind, double T, std::size_t n, double gam
     const double u = static_cast<double>(i) / static_cast<double>(n);
     t[i] = kind == GridKind::uniform ? T * u : T * (1 - std::pow(1 - u, gamma));
   }
+  for (std::size_t i = 0; i < n; ++i)
+    if (!(t[i] < t[i + 1]))
+      throw InputError(
+          fmt::format("the times {} and {} of a grid of {} steps on [0, {:g}] are equal in doubles", i, i + 1,
+                      n, T),
+          kind == GridKind::uniform ? "horizon" : "gamma",
+          fmt::format("{}", kind == GridKind::uniform ? T : gamma));
   return t;
 }
 

@@ -67,6 +67,26 @@ Grid sinh_grid() {
 
 }  // namespace
 
+TEST_CASE("Student's law of many degrees of freedom goes over into Gauss's") {
+  // With n degrees of freedom, log g(v) = -v^2/2 - log(2 pi)/2 + (v^4/4 - v^2/2 - 1/4)/n + O(n^-2) for scale 1.
+  const std::vector<double> v = {0, 0.3, -1, 2.5, -4, 6};
+  for (const double n : {99.0, 100.0, 101.0, 1e4, 1e6, 1e8, 1e10, 1e12, 1e14, 1e16, 1e17, 1e100, 1e300}) {
+    const NoiseLaw law{NoiseLaw::Kind::student_t, 1, n};
+    const std::vector<double> on_tape = log_g(law, v);
+    for (std::size_t i = 0; i < v.size(); ++i) {
+      const double square = v[i] * v[i];
+      const double expected = -square / 2 - 0.5 * std::log(2 * 3.14159265358979323846) +
+                              (square * square / 4 - square / 2 - 0.25) / n;
+      // The term of second order is (-v^6/6 + v^4/4 + ..)/n^2, below 8000/n^2 for |v| <= 6.
+      INFO("n " << n << ", v " << v[i]);
+      CHECK(on_tape[i] == Approx(expected).margin(1e-12 + 8000 / (n * n)));
+      CHECK(log_noise(law, v[i]) == Approx(expected).margin(1e-12 + 8000 / (n * n)));
+    }
+    // Far out it is finite, or a weight of zero; never NaN.
+    for (const double far : log_g(law, {1e150, 1e160, -1e300})) CHECK(!std::isnan(far));
+  }
+}
+
 TEST_CASE("every noise law integrates to 1") {
   // The trapezoidal rule with 40 001 points: error 1e-3^2/12 times the jump of the derivative at Laplace's
   // kink, below 1e-6; the tail of Student's law beyond sinh(20) = 2e8 is below 1e-25.
