@@ -5,10 +5,11 @@
 #include <bit>
 #include <cstring>
 #include <fstream>
-#include <sstream>
 
 #include "checksum.hpp"
 #include "wienertree/numeric/error.hpp"
+#include "wienertree/numeric/memory.hpp"
+#include "wienertree/numeric/read_all.hpp"
 
 namespace wienertree::app {
 namespace {
@@ -77,9 +78,9 @@ std::string read_checkpoint(const std::string& file, const Json& run) {
   const auto refuse = [&](const std::string& message) { throw InputError(message, "--resume", file); };
   std::ifstream in(file, std::ios::binary);
   if (!in) refuse("cannot be opened");
-  std::ostringstream copy;
-  if (!(copy << in.rdbuf())) refuse("cannot be read, or is empty");
-  const std::string content = copy.str();
+  // Held twice while it is read: as bytes, and as what they stand for.
+  const std::string content = read_all(in, static_cast<std::size_t>(memory_limit() / 2), "--resume " + file);
+  if (in.bad() || content.empty()) refuse("cannot be read, or is empty");
   if (!content.starts_with(magic)) refuse("is not a checkpoint");
   const std::size_t first = content.find('\n'), second = content.find('\n', first + 1);
   const std::string format = content.substr(magic.size(), std::min(first, magic.size() + 20) - magic.size());

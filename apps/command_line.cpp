@@ -11,6 +11,7 @@
 #include "interruption.hpp"
 #include "output.hpp"
 #include "wienertree/model/text/location.hpp"
+#include "wienertree/numeric/memory.hpp"
 
 namespace wienertree::app {
 namespace {
@@ -153,6 +154,13 @@ void add_assignments(CLI::App& app, Assignments& target) {
       ->type_name("NAME=VALUE")
       ->expected(1)
       ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
+}
+
+void add_memory_limit(CLI::App& app) {
+  app.add_option_function<std::string>(
+         "--memory", [](const std::string& text) { set_memory_limit(finite_number("--memory", text)); },
+         "Limit of the memory that may be taken [three quarters of what the machine has free]")
+      ->type_name("BYTES");
 }
 
 void set_option(CLI::App& app, const std::string& name, const std::vector<std::string>& values) {

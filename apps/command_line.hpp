@@ -75,6 +75,9 @@ using Assignments = std::vector<std::pair<std::string, double>>;
 std::pair<std::string, double> parse_assignment(const std::string& text, const std::string& option);
 void add_assignments(CLI::App& app, Assignments& target);
 
+/// `--memory BYTES`: sets the limit of the process, before anything is estimated.
+void add_memory_limit(CLI::App& app);
+
 /// Gives an option of `app` its values outside of any command line: every value is parsed as its text.
 /// @throws InputError for an unknown option, with the nearest known one, and as the option does when parsed
 void set_option(CLI::App& app, const std::string& name, const std::vector<std::string>& values);

@@ -208,6 +208,7 @@ void add_compare_command(CLI::App& program) {
   add_text(app, "--plot", a->plot, "FILE",
            "A picture of log Bayes factors and probabilities through time, .svg or .png");
   add_checkpoint_options(app, a->saving);
+  add_memory_limit(app);
   app.add_flag("--quiet", a->quiet, "No summary and no progress bar");
   app.footer(
       "Example:\n"

@@ -7,6 +7,7 @@
 
 #include "formula_choice.hpp"
 #include "tree_choices.hpp"
+#include "wienertree/filter/filter_memory.hpp"
 #include "wienertree/filter/gaussian_mixture_filter.hpp"
 
 namespace wienertree::app {
@@ -221,7 +222,10 @@ FilterSetup filter_setup(const FilterArguments& a, const Model& model) {
   const std::size_t nodes =
       a.nodes.value_or(default_nodes(o.method, o.thinning.method, model.reported_dimension()));
   (o.method == FilterMethod::grid ? o.grid_points : o.nodes) = nodes;
-  if (!keeps_nodes(o.method)) return setup;
+  if (!keeps_nodes(o.method)) {
+    refuse_oversized_filter(model, o);
+    return setup;
+  }
   if (!moves_particles(o.method))
     o.formula = choose_formula(degree_for(a, model), a.formula, model.noise_dimension());
   o.thinning.order = a.order.value_or(SiteOrder::spatial);
@@ -240,6 +244,7 @@ FilterSetup filter_setup(const FilterArguments& a, const Model& model) {
   o.threads =
       static_cast<unsigned>(a.threads.value_or(many ? std::max(1U, std::thread::hardware_concurrency()) : 1));
   setup.launches = static_cast<std::uint32_t>(a.launches.value_or(1));
+  refuse_oversized_filter(model, o, setup.launches);
   setup.random =
       moves_particles(o.method) || (o.method == FilterMethod::klv && !recombines(o.thinning.method));
   return setup;

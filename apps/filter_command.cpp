@@ -160,6 +160,7 @@ void add_filter_command(CLI::App& program) {
   add_number(app, "--density-at", a->density_at, Sign::any, "Draw the law at this time instead");
   add_text(app, "--signal", a->signal, "FILE", "The true signal (CSV t,<state>,..), to be drawn as well");
   add_checkpoint_options(app, a->saving);
+  add_memory_limit(app);
   app.add_flag("--quiet", a->quiet, "No summary and no progress bar");
   app.footer(
       "Example:\n"

@@ -7,6 +7,7 @@
 
 #include "filter_table.hpp"
 #include "progress.hpp"
+#include "wienertree/numeric/memory.hpp"
 
 namespace wienertree::app {
 namespace {
@@ -113,6 +114,12 @@ FilterRun run_filter(const Model& model, const FilterSetup& setup, WindowSource&
   saved.resume(exchange);
   check_density_time(request, windows);
   refuse_oversized_tree(model, setup.options, windows.size());
+  if (request.keep_rows) {
+    // A row as numbers and as text.
+    const std::size_t columns = filter_columns(model, setup, request.highest_moment).size();
+    require_memory(static_cast<double>(windows.size()) * (28 * static_cast<double>(columns) + 48),
+                   fmt::format("a table of {} rows", windows.size()), "--steps");
+  }
   if (!saved.resumes() && !windows.observed_at_start()) filters.record(windows.start());
   {
     Progress progress("filter", windows.size(), request.progress);

@@ -59,6 +59,7 @@ void add_simulate_command(CLI::App& program) {
   add_text(app, "--observations", a->observations, "FILE",
            "Observations as CSV: t,y1,..; - is standard output");
   add_text(app, "--signal", a->signal, "FILE", "The signal as CSV: t,<state>,..; - is standard output");
+  add_memory_limit(app);
   add_assignments(app, a->parameters);
   app.footer(
       "Example:\n"

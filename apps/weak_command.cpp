@@ -156,6 +156,7 @@ void add_weak_command(CLI::App& program) {
   add_text(app, "--output", a->output, "FILE", "Where the table goes [standard output]");
   add_choice(app, "--format", a->format, formats, "Of the table [csv]");
   add_checkpoint_options(app, a->saving);
+  add_memory_limit(app);
   app.add_flag("--quiet", a->quiet, "No summary and no progress bar");
   app.footer(
       "Example:\n"

@@ -198,6 +198,8 @@ double number_named(const NamedNumbers& numbers, const std::string& name) {
   return std::numeric_limits<double>::quiet_NaN();
 }
 
+constexpr std::size_t most_cells = 10'000;
+
 std::vector<StudyCell> study_cells(const Study& study, ModelShelf& models) {
   std::vector<StudyCell> cells;
   for (std::size_t s = 0; s < study.series.size(); ++s) {
@@ -212,6 +214,9 @@ std::vector<StudyCell> study_cells(const Study& study, ModelShelf& models) {
           "has no place in a study, whose runs share the threads: give --threads on the command line",
           threads->where);
     for_every_choice(series.options, [&](const CellOptions& options) {
+      if (cells.size() == most_cells)
+        throw InputError(fmt::format("a study of more than {} combinations of options", most_cells),
+                         series.where);
       StudyCell cell;
       cell.series = s;
       cell.options = options;

@@ -210,6 +210,7 @@ void add_study_command(CLI::App& program) {
   app.add_flag("--full", a->full, "In the size of the publication");
   add_count(app, "--threads", a->threads, 1, "Threads, a run each; results do not depend on them [all]",
             1024);
+  add_memory_limit(app);
   app.add_flag("--quiet", a->quiet, "No summary and no progress bar");
   app.footer(bundled_studies);
   app.callback([a] { study_and_write(*a); });

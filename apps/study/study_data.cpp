@@ -8,6 +8,7 @@
 
 #include "../window_source.hpp"
 #include "wienertree/filter/simulate.hpp"
+#include "wienertree/numeric/memory.hpp"
 #include "wienertree/study/wasserstein.hpp"
 
 namespace wienertree::app {
@@ -171,6 +172,11 @@ StudyData::StudyData(const Study& study, const std::vector<StudyCell>& cells, Mo
     if (cell.filter) {
       const std::string key = observation_key(study, cell);
       if (!records_.contains(key)) {
+        if (!study.observations.file)
+          require_memory(sizeof(double) * static_cast<double>(study.observations.keep) *
+                             static_cast<double>(paths_ * (1 + cell.filter->model->observation_dimension())),
+                         fmt::format("{} simulated records of {} rows", paths_, study.observations.keep),
+                         "observations");
         for (std::size_t p = 0; p < paths_; ++p) records_[key].push_back(std::make_unique<Path>());
         simulated_[key] = study.observations.model ? models.get(models.file_of(*study.observations.model), {})
                                                    : cell.filter->model;
@@ -209,6 +215,19 @@ StudyData::StudyData(const Study& study, const std::vector<StudyCell>& cells, Mo
     }
     problems_[key] = std::move(problem);
   }
+  for (const StudyCell& cell : cells)
+    if (cell.filter && cell.filter->until) require_inside_record(cell, *cell.filter->until);
+}
+
+// A time that the record does not reach would stand for another in the tables.
+void StudyData::require_inside_record(const StudyCell& cell, double until) {
+  const bool simulated = !study_.observations.file.has_value();
+  const double first = simulated ? 0 : observations(cell, 0).times.front(),
+               last = simulated ? study_.observations.horizon : observations(cell, 0).times.back();
+  const double slack = 1e-9 * std::max(std::fabs(first), std::fabs(last));
+  if (until > first - slack && until < last + slack) return;
+  throw InputError(fmt::format("must lie within the record, {:g} .. {:g}", first, last),
+                   study_.series[cell.series].where + ", until", fmt::format("{:g}", until));
 }
 
 StudyData::~StudyData() = default;

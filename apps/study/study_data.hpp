@@ -62,6 +62,7 @@ class StudyData {
   ObservationWindows windows(const FilterCell& cell, const ObservationPath& path) const;
 
  private:
+  void require_inside_record(const StudyCell& cell, double until);
   struct Path;
   struct Truth;
   struct Problem;

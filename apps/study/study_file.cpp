@@ -6,17 +6,17 @@
 #include <filesystem>
 #include <fstream>
 #include <limits>
-#include <sstream>
 
 #include "study_keys.hpp"
 #include "wienertree/model/text/toml_section.hpp"
+#include "wienertree/numeric/read_all.hpp"
 
 namespace wienertree::app {
 namespace {
 
 using text::Section;
 
-constexpr std::uint64_t most = std::uint64_t{1} << 53;
+constexpr std::uint64_t most = std::uint64_t{1} << 53, most_steps = 1'000'000'000;
 
 const std::vector<std::pair<std::string, ErrorMeasure>> measures = {
     {"value", ErrorMeasure::value},
@@ -35,9 +35,7 @@ std::vector<std::string> measure_names() {
 std::string contents_of(const std::string& path) {
   std::ifstream in(path, std::ios::binary);
   if (!in) throw InputError("cannot be read", "study", path);
-  std::ostringstream all;
-  all << in.rdbuf();
-  return std::move(all).str();
+  return read_all(in, largest_text_file, "study " + path);
 }
 
 // Values of [full] take the place of those outside it. Nodes are moved, since a copy would forget its place
@@ -121,8 +119,8 @@ StudyObservations read_observation_spec(const Section& section) {
   }
   if (section.has("model")) o.model = section.string("model");
   o.horizon = section.number("horizon");
-  o.steps = section.count("steps", 1, most);
-  o.keep = section.has("keep") ? section.count("keep", 1, most) : o.steps;
+  o.steps = section.count("steps", 1, most_steps);
+  o.keep = section.has("keep") ? section.count("keep", 1, most_steps) : o.steps;
   o.paths = section.has("paths") ? section.count("paths", 1, 1'000'000) : 1;
   o.seed = section.has("seed") ? section.count("seed", 0, most) : 1;
   return o;

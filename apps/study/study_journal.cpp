@@ -15,6 +15,8 @@
 
 #include "../output.hpp"
 #include "wienertree/numeric/error.hpp"
+#include "wienertree/numeric/memory.hpp"
+#include "wienertree/numeric/read_all.hpp"
 
 namespace wienertree::app {
 namespace {
@@ -109,9 +111,8 @@ StudyJournal::StudyJournal(const std::string& directory, std::vector<std::string
     throw InputError("another study is running there", "--output", directory);
   descriptor_ = ::open(file_.c_str(), O_RDWR | O_CREAT | O_APPEND | O_CLOEXEC, 0666);
   if (descriptor_ < 0) throw InputError("cannot be written: " + reason(), "--output", file_);
-  std::ostringstream all;
-  all << std::ifstream(file_, std::ios::binary).rdbuf();
-  std::string text = std::move(all).str();
+  std::ifstream in(file_, std::ios::binary);
+  std::string text = read_all(in, static_cast<std::size_t>(memory_limit() / 8), file_);
   const std::size_t whole = text.rfind('\n') == std::string::npos ? 0 : text.rfind('\n') + 1;
   if (whole < text.size() && ::ftruncate(descriptor_, static_cast<off_t>(whole)) != 0)
     throw RunError("cannot be shortened: " + reason(), "--output", file_);

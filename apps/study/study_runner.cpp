@@ -11,6 +11,7 @@
 #include <tuple>
 
 #include "../progress.hpp"
+#include "wienertree/numeric/memory.hpp"
 #include "wienertree/numeric/parallel.hpp"
 
 namespace wienertree::app {
@@ -28,6 +29,11 @@ Key key_of(const RunRecord& record) { return {record.cell, record.path, record.l
 
 // Each run once, also where two series share it.
 std::vector<Task> tasks_of(const std::vector<StudyCell>& cells, std::size_t paths) {
+  double runs = 0;
+  for (const StudyCell& cell : cells) runs += static_cast<double>(paths) * cell.launches;
+  // A task with its key in the set of those known, and its record with a line of text.
+  constexpr double bytes_a_run = 600;
+  require_memory(bytes_a_run * runs, fmt::format("a study of {:g} runs", runs), "launches, paths");
   std::vector<Task> tasks;
   std::set<Key> known;
   for (const StudyCell& cell : cells)

@@ -7,6 +7,7 @@
 #include "wienertree/filter/benes_filter.hpp"
 #include "wienertree/filter/component_filter.hpp"
 #include "wienertree/filter/euler_filter.hpp"
+#include "wienertree/filter/filter_memory.hpp"
 #include "wienertree/filter/gaussian_mixture_filter.hpp"
 #include "wienertree/filter/grid_filter.hpp"
 #include "wienertree/filter/kalman_bucy_filter.hpp"
@@ -101,6 +102,7 @@ void Filter::exchange(StateArchive& archive) {
 
 std::unique_ptr<Filter> make_filter(const Model& model, const FilterOptions& options) {
   check(model);
+  refuse_oversized_filter(model, options);
   switch (options.method) {
     case FilterMethod::benes:
       return std::make_unique<BenesFilter>(model);

@@ -14,9 +14,10 @@
 #include "wienertree/filter/weights.hpp"
 #include "wienertree/filter/window.hpp"
 #include "wienertree/model/model.hpp"
+#include "wienertree/numeric/memory.hpp"
 #include "wienertree/numeric/state_archive.hpp"
-#include "wienertree/tree/generation.hpp"
 #include "wienertree/thinning/thinning.hpp"
+#include "wienertree/tree/generation.hpp"
 
 namespace wienertree {
 
@@ -128,8 +129,8 @@ struct FilterOptions {
   std::uint64_t seed = 1;
   std::uint32_t launch = 0;
   unsigned threads = 1;
-  /// An unpruned tree is refused before a step that would need more memory than this, in bytes.
-  double memory_limit = 4.0e9;
+  /// A filter, or a step of an unpruned tree, that would need more memory than this, in bytes, is refused.
+  double memory_limit = wienertree::memory_limit();
   /// Grid filter: number of cells, and the longest step in units of the density's own time scale.
   std::size_t grid_points = 400;
   double grid_step = 0.25;

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <utility>
 
+#include "wienertree/thinning/recombination/recombination.hpp"
 #include "wienertree/tree/growth.hpp"
 #include "wienertree/weak/slabs.hpp"
 #include "wienertree/tree/tree_size.hpp"
@@ -193,6 +194,9 @@ WeakEstimate weak_approximation(const Model& model, const Generation& start,
                           start.size());
   else
     refuse_oversized_step(options.formula, model, options.nodes, options.memory_limit);
+  if (options.thinning.method == ThinningMethod::levelwise)
+    require_memory(levelwise_bytes(model.state_dimension(), options.nodes), options.memory_limit,
+                   fmt::format("thinning by one patch of {} nodes", options.nodes), "--nodes");
   if (const WeakEstimate* known = options.journal ? options.journal->next() : nullptr) {
     StateArchive::require(known->value.size() == payoffs.size());
     return *known;

@@ -12,8 +12,9 @@
 #include "wienertree/cubature/formula.hpp"
 #include "wienertree/model/batch_function.hpp"
 #include "wienertree/model/model.hpp"
-#include "wienertree/tree/generation.hpp"
+#include "wienertree/numeric/memory.hpp"
 #include "wienertree/thinning/thinning.hpp"
+#include "wienertree/tree/generation.hpp"
 #include "wienertree/tree/time_grid.hpp"
 
 namespace wienertree {
@@ -37,7 +38,7 @@ struct WeakOptions {
   /// step exp(-x) becomes part of the node's weight and x starts again from 0, so that thinning sees the
   /// discounted measure (Feynman-Kac) and no further dimension.
   std::optional<std::size_t> discount_state = {};
-  double memory_limit = 4.0e9;  ///< bytes; a tree over it is refused before it starts
+  double memory_limit = wienertree::memory_limit();  ///< bytes; a tree over it is refused before it starts
   /// Called after each step with its number, from 1; may be empty. What it throws ends the computation.
   std::function<void(std::size_t step)> observe = {};
   /// Where the trees of the computation are recorded, to be put down and taken up; may be null.
