@@ -3,10 +3,14 @@
 #include <pybind11/numpy.h>
 #include <pybind11/pybind11.h>
 
+#include <limits>
 #include <memory>
 #include <span>
+#include <string>
 #include <utility>
 #include <vector>
+
+#include "wienertree/numeric/error.hpp"
 
 namespace wienertree::python {
 
@@ -14,6 +18,26 @@ namespace py = pybind11;
 
 /// An array read where it lies if it is a C-contiguous one of doubles, else NumPy's conversion of it to one.
 using Doubles = py::array_t<double, py::array::c_style | py::array::forcecast>;
+
+/// Numbers that were handed in: arrays, masked ones (what is masked is NaN), lists.
+/// @throws InputError naming `what` for dates and durations, which have no unit here, and for what is not real numbers
+inline Doubles doubles_of(const py::handle& numbers, const std::string& what) {
+  const py::module_ numpy = py::module_::import("numpy");
+  const py::object masked = numpy.attr("ma").attr("MaskedArray");
+  const py::object array = py::isinstance(numbers, masked) ? py::reinterpret_borrow<py::object>(numbers)
+                                                           : py::object(numpy.attr("asarray")(numbers));
+  const auto kind = array.attr("dtype").attr("kind").cast<std::string>();
+  if (kind == "M" || kind == "m")
+    throw InputError(
+        "dates and durations have no unit here: give numbers, (t - t[0]) / numpy.timedelta64(1, \"D\") for "
+        "days",
+        what, py::str(array.attr("dtype")).cast<std::string>());
+  if (std::string("biufO").find(kind) == std::string::npos)
+    throw InputError("must be real numbers", what, py::str(array.attr("dtype")).cast<std::string>());
+  if (py::isinstance(array, masked))
+    return Doubles(array.attr("astype")("float64").attr("filled")(std::numeric_limits<double>::quiet_NaN()));
+  return Doubles(array);
+}
 
 inline std::span<const double> values_of(const Doubles& array) {
   return {array.data(), static_cast<std::size_t>(array.size())};

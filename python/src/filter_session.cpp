@@ -58,14 +58,14 @@ void FilterSession::read(const py::object& observations, std::optional<std::size
     return;
   }
   if (py::hasattr(observations, "observations")) {  // a Simulation
-    times_ = Doubles(observations.attr("t"));
-    values_ = Doubles(observations.attr("observations"));
+    times_ = doubles_of(observations.attr("t"), "observations, t");
+    values_ = doubles_of(observations.attr("observations"), "observations, y");
   } else {
     if (!py::isinstance<py::tuple>(observations) || py::len(observations) != 2)
       throw InputError("must be a file, a pair (t, y) of arrays or a Simulation", "observations",
                        py::str(py::type::of(observations).attr("__name__")).cast<std::string>());
-    times_ = Doubles(observations[py::int_(0)]);
-    values_ = Doubles(observations[py::int_(1)]);
+    times_ = doubles_of(observations[py::int_(0)], "observations, t");
+    values_ = doubles_of(observations[py::int_(1)], "observations, y");
   }
   const auto k = static_cast<py::ssize_t>(m.observation_dimension());
   const bool shaped =

@@ -32,9 +32,11 @@ py::object moved(const Batch& states) {
                    {static_cast<py::ssize_t>(view.components()), static_cast<py::ssize_t>(view.nodes())});
 }
 
-py::object thin(const Doubles& states, const Doubles& log_weight, std::size_t nodes,
+py::object thin(const py::object& given_states, const py::object& given_log_weight, std::size_t nodes,
                 const std::string& method, const std::string& order, int recombination_degree,
                 std::size_t parents, std::uint64_t seed, std::uint32_t step, std::size_t threads) {
+  const Doubles states = doubles_of(given_states, "states"),
+                log_weight = doubles_of(given_log_weight, "log_weight");
   const ThinningOptions options{chosen("method", method, app::thinnings), chosen("order", order, app::orders),
                                 recombination_degree};
   ThreadPool pool(threads);

@@ -56,6 +56,29 @@ def test_the_weighted_filter_has_its_likelihood_ratio():
     assert "log_bayes_factor" in nile
 
 
+def test_what_is_masked_is_missing():
+    """The evidence of a mask is that of NaN, and not that of the numbers below the mask."""
+    model = {"name": "m", "convention": "ito", "state": {"x": {"initial": 0.0}}, "drift": {"x": "-x"}, "diffusion": {"x": ["1"]},
+             "observation": {"kind": "discrete", "h": ["x"], "noise": {"law": "gaussian", "sd": 1.0}}}
+    t, y = np.arange(6.0), np.array([0.1, 0.2, 1e9, 0.0, 1e9, 0.3])
+    masked = np.ma.masked_greater(y, 1e6)
+    missing = np.where(y > 1e6, np.nan, y)
+    expected = wt.filter(model, (t, missing), method="kalman").log_evidence
+    assert np.array_equal(wt.filter(model, (t, masked), method="kalman").log_evidence, expected)
+    whole = np.ma.masked_greater(np.array([0, 0, 9, 0, 9, 0]), 1)
+    assert np.isfinite(wt.filter(model, (t, whole), method="kalman").log_evidence).all()
+    with pytest.raises(wt.InputError, match="not a finite number"):
+        wt.filter(model, (np.ma.masked_equal(t, 3.0), y), method="kalman")
+
+
+@pytest.mark.parametrize("times", [np.arange("2020-01-01", "2020-01-07", dtype="datetime64[D]"), np.arange(6).astype("timedelta64[s]"), np.arange(6) * 1j, np.array(list("abcdef"))])
+def test_what_has_no_unit_or_is_no_number_is_refused(times):
+    with pytest.raises(wt.InputError, match="unit|real numbers"):
+        wt.filter("nile", (times, np.zeros(6)))
+    with pytest.raises(wt.InputError, match="unit|real numbers"):
+        wt.thin(times, np.zeros(6), 3)
+
+
 def test_shapes_and_options():
     record = wt.simulate("linear-3d", horizon=1, steps=100, seed=1)
     result = wt.filter("linear-3d", record, steps=10, nodes=200, moments=3)
