@@ -6,6 +6,7 @@
 #include <charconv>
 #include <filesystem>
 #include <limits>
+#include <numeric>
 #include <set>
 
 #include "../data_directory.hpp"
@@ -198,10 +199,11 @@ double number_named(const NamedNumbers& numbers, const std::string& name) {
   return std::numeric_limits<double>::quiet_NaN();
 }
 
-constexpr std::size_t most_cells = 10'000;
+constexpr double most_cells = 5000;
 
 std::vector<StudyCell> study_cells(const Study& study, ModelShelf& models) {
   std::vector<StudyCell> cells;
+  double combinations = 0;
   for (std::size_t s = 0; s < study.series.size(); ++s) {
     const StudySeries& series = study.series[s];
     std::set<std::string> keys;
@@ -213,10 +215,14 @@ std::vector<StudyCell> study_cells(const Study& study, ModelShelf& models) {
       throw InputError(
           "has no place in a study, whose runs share the threads: give --threads on the command line",
           threads->where);
+    combinations += std::accumulate(
+        series.options.begin(), series.options.end(), 1.0,
+        [](double all, const StudyOption& o) { return all * static_cast<double>(o.values.size()); });
+    if (combinations > most_cells)
+      throw InputError(
+          fmt::format("a study of {:g} combinations of options, more than {}", combinations, most_cells),
+          series.where);
     for_every_choice(series.options, [&](const CellOptions& options) {
-      if (cells.size() == most_cells)
-        throw InputError(fmt::format("a study of more than {} combinations of options", most_cells),
-                         series.where);
       StudyCell cell;
       cell.series = s;
       cell.options = options;

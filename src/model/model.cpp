@@ -6,13 +6,6 @@
 
 namespace wienertree {
 
-Error::Error(std::string message, std::string where, std::string value)
-    : std::runtime_error(where + (where.empty() ? "" : ": ") + message +
-                         (value.empty() ? "" : " (" + value + ")")),
-      message_(std::move(message)),
-      where_(std::move(where)),
-      value_(std::move(value)) {}
-
 void VectorFields::exact_flow(std::span<const double>, BatchView) const {
   throw InputError("these vector fields have no closed-form flow", "flow", "exact");
 }
