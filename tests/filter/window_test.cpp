@@ -165,9 +165,8 @@ TEST_CASE("times that a double does not tell apart are refused, not repeated") {
   CHECK_THROWS_WITH(discrete(path_of({-1e308, 1e308}, {0, 0}), 1),
                     Catch::Contains("further apart than a double"));
   CHECK_THROWS_WITH(discrete(path_of({0, 1e-320}, {0, 0}), 100),
-                    Catch::Contains("row 2") && Catch::Contains("too short for 100 steps"));
-  CHECK_THROWS_WITH(discrete(path_of({1e15, 1e15 + 1}, {0, 0}), 100),
-                    Catch::Contains("too short for 100 steps"));
+                    Catch::Contains("row 2") && Catch::Contains("too short for"));
+  CHECK_THROWS_WITH(discrete(path_of({1e15, 1e15 + 1}, {0, 0}), 100), Catch::Contains("too short for"));
   CHECK(discrete(path_of({0, 1e-320}, {0, 0}), 1).size() == 2);
   const ObservationWindows windows = discrete(path_of({1e9, 1e9 + 1}, {0, 0}), 1000);
   ObservationWindow w;
