@@ -6,7 +6,7 @@ configure_file(src/version.hpp.in ${PROJECT_BINARY_DIR}/generated/wienertree/ver
 
 add_library(wienertree_build_settings INTERFACE)
 target_compile_options(wienertree_build_settings INTERFACE
-  -Wall -Wextra -Wpedantic -Wconversion -Wshadow -Werror)
+  -Wall -Wextra -Wpedantic -Wconversion -Wshadow $<$<BOOL:${WIENERTREE_WARNINGS_AS_ERRORS}>:-Werror>)
 if(WIENERTREE_SANITIZE)
   target_compile_options(wienertree_build_settings INTERFACE
     -fsanitize=${WIENERTREE_SANITIZE} -fno-omit-frame-pointer -fno-sanitize-recover=all
@@ -37,7 +37,11 @@ function(wienertree_known_leaks test)
 endfunction()
 
 # What takes time is in the library. gcc 12 takes sums of strings for writes out of bounds when it optimises little (GCC bug 105651).
-set(wienertree_test_options -O1 "$<$<CXX_COMPILER_ID:GNU>:-Wno-array-bounds;-Wno-stringop-overflow;-Wno-stringop-overread>")
+set(level -O1)
+if(WIENERTREE_SANITIZE)
+  set(level -O0)  # instrumented code takes far longer to optimise than these tests to run
+endif()
+set(wienertree_test_options ${level} "$<$<CXX_COMPILER_ID:GNU>:-Wno-array-bounds;-Wno-stringop-overflow;-Wno-stringop-overread>")
 
 # wienertree_test(<name> LIBS <targets>... SOURCES <files>... [LABELS <labels>...] [TIMEOUT <s>] [ENVIRONMENT <NAME=value>...]): one Catch2 program, one ctest entry.
 function(wienertree_test name)
@@ -61,6 +65,12 @@ function(wienertree_test name)
   endif()
   if(ARG_TIMEOUT)
     set_tests_properties(${name} PROPERTIES TIMEOUT ${ARG_TIMEOUT})
+  endif()
+  # What runs only when asked for is built only then, by the first of the slow tests.
+  if("slow" IN_LIST ARG_LABELS)
+    set_target_properties(test_${name} PROPERTIES EXCLUDE_FROM_ALL ON)
+    add_dependencies(wienertree_slow_tests test_${name})
+    set_tests_properties(${name} PROPERTIES FIXTURES_REQUIRED slow_tests)
   endif()
   if(ARG_ENVIRONMENT)
     set_property(TEST ${name} APPEND PROPERTY ENVIRONMENT "${ARG_ENVIRONMENT}")
