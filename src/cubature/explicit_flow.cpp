@@ -30,9 +30,9 @@ constexpr double low_to_high = 3.5;
 /// II.4).
 constexpr double safety = 0.9, smallest_factor = 0.1, largest_factor = 6.0;
 
-/// A node on its way through a segment.
-struct Traveller {
-  std::size_t node = 0;
+/// A node that has not reached the end of the segment.
+struct UnfinishedNode {
+  std::size_t index = 0;
   double u = 0;                                   // reached so far
   double steps = 1;                               // equal steps planned for the rest
   int attempts = 0, rejections = 0, crawled = 0;  // rejections: since the last accepted step
@@ -41,8 +41,8 @@ struct Traveller {
 };
 
 /// Every node has step sizes of its own, from its own error estimates. A block of nodes first tries the whole
-/// segment in one step; the nodes that need more are gathered from all blocks and travel on together, the
-/// places of those that arrive being taken by others. As lanes never mix, what happens to a node is a
+/// segment in one step; the nodes that need more are collected from all blocks and integrated together, the
+/// places of those that are finished being taken by others. As lanes never mix, what happens to a node is a
 /// function of its state and D alone, except for the nodes that end with CVODE: those depend on each other
 /// within a block of flow_block.
 class ExplicitFlow final : public Flow {
@@ -57,16 +57,16 @@ class ExplicitFlow final : public Flow {
         first_choice_(low_, high_, degree, field_, block_),
         states_(2 * lanes * field_.dimension()),
         stiff_(field_, tolerance) {
-    travellers_.reserve(2 * lanes);
+    unfinished_.reserve(2 * lanes);
   }
 
   void move(std::span<const double> D, BatchView x, std::vector<NodeFailure>& failures) override {
     const std::size_t failed_before = failures.size();
     for (std::size_t first = 0; first < x.nodes(); first += lanes) {
       stride(D, x, first, std::min(lanes, x.nodes() - first), failures);
-      while (travellers_.size() >= lanes) travel(D, x);
+      while (unfinished_.size() >= lanes) step_unfinished(D, x);
     }
-    while (!travellers_.empty()) travel(D, x);
+    while (!unfinished_.empty()) step_unfinished(D, x);
     stiff_.finish(D, x, failures, statistics_);
     field_.enforce_bounds(x, failures);
     sort_failures(failures, failed_before);
@@ -79,17 +79,17 @@ class ExplicitFlow final : public Flow {
   std::string_view name() const override { return "explicit"; }
 
  private:
-  enum class Progress { travelling, arrived, stiff };
+  enum class Progress { unfinished, finished, stiff };
 
   void stride(std::span<const double> D, BatchView x, std::size_t first, std::size_t count,
               std::vector<NodeFailure>& failures);
-  void travel(std::span<const double> D, BatchView x);
-  Progress advance(Traveller& traveller, double squared_error) const;
+  void step_unfinished(std::span<const double> D, BatchView x);
+  Progress advance(UnfinishedNode& node, double squared_error) const;
   void attempt(const RungeKuttaBlock::Method& method, std::span<const double> D, std::size_t n) {
     block_.attempt(method, field_, D, n);
     statistics_.field_evaluations += n * static_cast<std::size_t>(method.pair().stages);
   }
-  double* state(std::size_t traveller) { return states_.data() + traveller * field_.dimension(); }
+  double* state(std::size_t place) { return states_.data() + place * field_.dimension(); }
 
   FlowTolerance tolerance_;
   int degree_;
@@ -97,8 +97,8 @@ class ExplicitFlow final : public Flow {
   RungeKuttaBlock block_;
   RungeKuttaBlock::Method low_, high_;
   PairChoice first_choice_;
-  std::vector<Traveller> travellers_;
-  std::vector<double> states_;  // of the travellers, one after the other
+  std::vector<UnfinishedNode> unfinished_;
+  std::vector<double> states_;  // of the unfinished nodes, one after the other
   StiffNodes stiff_;
 };
 
@@ -110,7 +110,7 @@ double growth(double squared, int q) {
   return std::clamp(factor, smallest_factor, largest_factor);
 }
 
-/// The whole segment in one step, for nodes first .. first+count-1; the others set out as travellers.
+/// The whole segment in one step, for nodes first .. first+count-1; the others join the unfinished nodes.
 void ExplicitFlow::stride(std::span<const double> D, BatchView x, std::size_t first, std::size_t count,
                           std::vector<NodeFailure>& failures) {
   const RungeKuttaBlock::Method& method = first_choice_(D);
@@ -133,64 +133,64 @@ void ExplicitFlow::stride(std::span<const double> D, BatchView x, std::size_t fi
       continue;
     }
     if (std::isnan(squared[n]) && fail_if_not_finite(x, first + n, failures)) continue;
-    for (std::size_t i = 0; i < x.components(); ++i) state(travellers_.size())[i] = here(i, n);
-    Traveller& traveller = travellers_.emplace_back();
-    traveller.node = first + n;
+    for (std::size_t i = 0; i < x.components(); ++i) state(unfinished_.size())[i] = here(i, n);
+    UnfinishedNode& node = unfinished_.emplace_back();
+    node.index = first + n;
     const double h = growth(squared[n], method.pair().estimate_order);
-    traveller.plan(&method == &low_ ? h * low_to_high : h);
+    node.plan(&method == &low_ ? h * low_to_high : h);
   }
 }
 
-/// One step of the last travellers, as many as there are lanes.
-void ExplicitFlow::travel(std::span<const double> D, BatchView x) {
-  const std::size_t count = std::min(lanes, travellers_.size()), first = travellers_.size() - count;
+/// One step of the last unfinished nodes, as many as there are lanes.
+void ExplicitFlow::step_unfinished(std::span<const double> D, BatchView x) {
+  const std::size_t count = std::min(lanes, unfinished_.size()), first = unfinished_.size() - count;
   const std::size_t d = field_.dimension();
   const BatchView start = block_.states(count);
   for (std::size_t n = 0; n < count; ++n) {
-    block_.step_sizes(count)[n] = travellers_[first + n].step();
+    block_.step_sizes(count)[n] = unfinished_[first + n].step();
     for (std::size_t i = 0; i < d; ++i) start(i, n) = state(first + n)[i];
   }
   attempt(high_, D, count);
   const ConstBatchView result = block_.results(count);
   for (std::size_t n = count; n-- > 0;) {
     const std::size_t place = first + n;
-    const double u = travellers_[place].u;
-    const Progress progress = advance(travellers_[place], block_.squared_errors(count)[n]);
-    if (progress == Progress::arrived) {
-      for (std::size_t i = 0; i < d; ++i) x(i, travellers_[place].node) = result(i, n);
+    const double u = unfinished_[place].u;
+    const Progress progress = advance(unfinished_[place], block_.squared_errors(count)[n]);
+    if (progress == Progress::finished) {
+      for (std::size_t i = 0; i < d; ++i) x(i, unfinished_[place].index) = result(i, n);
     } else {
-      if (travellers_[place].u > u)
+      if (unfinished_[place].u > u)
         for (std::size_t i = 0; i < d; ++i) state(place)[i] = result(i, n);
-      if (progress == Progress::travelling) continue;
-      stiff_.add(travellers_[place].node, 1.0 - travellers_[place].u, {state(place), d});
+      if (progress == Progress::unfinished) continue;
+      stiff_.add(unfinished_[place].index, 1.0 - unfinished_[place].u, {state(place), d});
     }
-    // The last traveller, whose turn is over, takes the place that is free now.
-    if (place + 1 != travellers_.size()) {
-      std::copy_n(state(travellers_.size() - 1), d, state(place));
-      travellers_[place] = travellers_.back();
+    // The last unfinished node, which had its step, takes the place that is free now.
+    if (place + 1 != unfinished_.size()) {
+      std::copy_n(state(unfinished_.size() - 1), d, state(place));
+      unfinished_[place] = unfinished_.back();
     }
-    travellers_.pop_back();
+    unfinished_.pop_back();
   }
 }
 
-ExplicitFlow::Progress ExplicitFlow::advance(Traveller& traveller, double squared_error) const {
-  const double h = traveller.step(), rating = h / std::max(h, shortest_rated);
+ExplicitFlow::Progress ExplicitFlow::advance(UnfinishedNode& node, double squared_error) const {
+  const double h = node.step(), rating = h / std::max(h, shortest_rated);
   const double squared = squared_error * rating * rating;
   double factor = growth(squared, high_.pair().estimate_order);
-  ++traveller.attempts;
+  ++node.attempts;
   if (squared <= 1.0) {
-    if (traveller.steps == 1.0) return Progress::arrived;
-    traveller.u += h;
-    traveller.rejections = 0;
-    if (factor < 2.0 && (1.0 - traveller.u) / h > crawling) ++traveller.crawled;
+    if (node.steps == 1.0) return Progress::finished;
+    node.u += h;
+    node.rejections = 0;
+    if (factor < 2.0 && (1.0 - node.u) / h > crawling) ++node.crawled;
   } else {
     // An error that does not fall with h as it should comes from a kink, a jump or the edge of the domain.
-    factor = std::min(factor, ++traveller.rejections > 1 ? smallest_factor : safety);
+    factor = std::min(factor, ++node.rejections > 1 ? smallest_factor : safety);
   }
-  traveller.plan(h * factor);
-  const bool stiff = traveller.crawled > most_crawling_steps || traveller.attempts > most_attempts ||
-                     traveller.step() < shortest;
-  return stiff ? Progress::stiff : Progress::travelling;
+  node.plan(h * factor);
+  const bool stiff =
+      node.crawled > most_crawling_steps || node.attempts > most_attempts || node.step() < shortest;
+  return stiff ? Progress::stiff : Progress::unfinished;
 }
 
 }  // namespace
