@@ -6,7 +6,8 @@ configure_file(src/version.hpp.in ${PROJECT_BINARY_DIR}/generated/wienertree/ver
 
 add_library(wienertree_build_settings INTERFACE)
 target_compile_options(wienertree_build_settings INTERFACE
-  -Wall -Wextra -Wpedantic -Wconversion -Wshadow $<$<BOOL:${WIENERTREE_WARNINGS_AS_ERRORS}>:-Werror>)
+  -Wall -Wextra -Wpedantic -Wconversion -Wshadow $<$<BOOL:${WIENERTREE_WARNINGS_AS_ERRORS}>:-Werror>
+  $<$<BOOL:${CMAKE_UNITY_BUILD}>:-Wno-shadow>)  # a name of one file may hide that of another
 if(WIENERTREE_SANITIZE)
   target_compile_options(wienertree_build_settings INTERFACE
     -fsanitize=${WIENERTREE_SANITIZE} -fno-omit-frame-pointer -fno-sanitize-recover=all
@@ -19,13 +20,21 @@ endif()
 function(wienertree_layer name)
   add_library(wienertree_${name} STATIC ${ARGN})
   add_library(wienertree::${name} ALIAS wienertree_${name})
-  set_target_properties(wienertree_${name} PROPERTIES EXPORT_NAME ${name})
+  set_target_properties(wienertree_${name} PROPERTIES EXPORT_NAME ${name} UNITY_BUILD_MODE GROUP)
   target_compile_features(wienertree_${name} PUBLIC cxx_std_20)
   target_include_directories(wienertree_${name} PUBLIC
     $<BUILD_INTERFACE:${PROJECT_BINARY_DIR}/include>
     $<BUILD_INTERFACE:${PROJECT_BINARY_DIR}/generated>
     $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}>)
   target_link_libraries(wienertree_${name} PRIVATE $<BUILD_INTERFACE:wienertree_build_settings>)
+endfunction()
+
+# wienertree_compiled_as_one(<target> <name> <sources>...): the sources are one translation unit in a unity build. Sources of
+# the target that are in no such group are compiled alone, as new ones are until they are added to a group: a group must not
+# define a name twice in its unnamed namespaces.
+function(wienertree_compiled_as_one target name)
+  set_target_properties(${target} PROPERTIES UNITY_BUILD_MODE GROUP)
+  set_source_files_properties(${ARGN} PROPERTIES UNITY_GROUP ${name})
 endfunction()
 
 # wienertree_known_leaks(<test>): what libraries keep until the end, and only that, is no leak to the address sanitizer.
