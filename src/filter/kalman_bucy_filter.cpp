@@ -86,15 +86,16 @@ double KalmanBucyFilter::rate() const {
 }
 
 void KalmanBucyFilter::pass_gap(double length, const Eigen::VectorXd& slope) {
+  // The first steps from a vague start may be very short; a time scale that stays so would take for ever.
+  constexpr int most_steps = 1'000'000;
   const double start = elapsed_;
-  for (double passed = 0; passed < length;) {
+  int steps = 0;
+  for (double passed = 0; passed < length; ++steps) {
     const double rest = length - passed, parts = std::ceil(rest * rate() / longest_step);
-    // Some 10 seconds; and far beyond, a part would be lost in the rounding of the time.
-    constexpr double most_parts = 1e7;
-    if (!(parts <= most_parts))
-      throw RunError("the filter's own time scale is too short for the gap between two rows",
-                     fmt::format("t = {:g}", elapsed_), fmt::format("{:g} steps", parts));
     const double s = parts > 1 ? rest / parts : rest;
+    if (steps == most_steps || (parts > 1 && !(passed + s > passed)))
+      throw RunError("the filter's own time scale is too short for the gap between two rows",
+                     fmt::format("t = {:g} after the start", elapsed_), fmt::format("steps of {:g}", s));
     gauss_step(s, slope);
     passed = parts > 1 ? passed + s : length;
     elapsed_ = start + passed;

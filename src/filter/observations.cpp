@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include <algorithm>
 #include <charconv>
 #include <cmath>
 #include <fstream>
@@ -116,9 +117,11 @@ bool ObservationReader::next(double& t, std::span<double> y) {
     throw InputError(message, fmt::format("{}:{}: column {}", origin_, line_number_, columns_[column]),
                      shown(value));
   };
-  if (!ended_ && looks_cut_off(trimmed(rest.substr(rest.rfind(',') + 1))))
-    throw InputError("the last row is cut off: it has no end of line, and its last field may go on",
-                     fmt::format("{}:{}", origin_, line_number_), shown(line_));
+  if (const std::size_t comma = rest.rfind(','); !ended_ && looks_cut_off(trimmed(rest.substr(comma + 1)))) {
+    const auto column = static_cast<std::size_t>(std::count(rest.begin(), rest.end(), ','));
+    fail("the row is cut off: it has no end of line, and its last field may go on",
+         std::min(column, dimension_), line_);
+  }
   bool last = false;
   for (std::size_t column = 0; column <= dimension_; ++column) {
     if (last) fail("the row ends early", column, line_);

@@ -8,9 +8,9 @@
 
 #include "wienertree/thinning/recombination/recombination.hpp"
 #include "wienertree/tree/growth.hpp"
-#include "wienertree/weak/slabs.hpp"
 #include "wienertree/tree/tree_size.hpp"
 #include "wienertree/weak/journal.hpp"
+#include "wienertree/weak/slabs.hpp"
 
 namespace wienertree {
 namespace {

@@ -183,7 +183,7 @@ TEST_CASE("a last row that was cut off is refused, a whole one without its end i
   const std::string rows = "t,y1\n0,0\n0.1,0.05\n";
   for (const char* field : {"0.", "1e", "1E", "1e+", "-", ""}) {
     place.write("Y.csv", rows + "0.2," + field);
-    check_refusal(place, "filter m.toml --observations Y.csv", 2, {"Y.csv:4", "cut off"});
+    check_refusal(place, "filter m.toml --observations Y.csv", 2, {"Y.csv:4: column y1", "cut off"});
   }
   for (const char* row : {"0.2,0.25", "0.2,1e3", "0.2,.5", "0.2,NA\n", "0.2,\n", "0.2,0.\n"}) {
     place.write("Y.csv", rows + row);
