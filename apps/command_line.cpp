@@ -23,12 +23,16 @@ bool parse_whole(const std::string& text, Number& number) {
   return status == std::errc() && end == text.data() + text.size();
 }
 
+}  // namespace
+
 double finite_number(const std::string& option, const std::string& text) {
   double number = 0;
   if (!parse_whole(text, number)) throw InputError("must be a number", option, text);
   if (!std::isfinite(number)) throw InputError("must be a finite number", option, text);
   return number;
 }
+
+namespace {
 
 std::vector<std::string> option_names(const CLI::App& app) {
   std::vector<std::string> names;
@@ -202,6 +206,8 @@ int run_program(CLI::App& app, int argc, char** argv) {
     complain(interrupted.what(), 1);
     end_by(interrupted.signal());
     return 1;
+  } catch (const SaidAlready& said) {
+    return said.exit_code;
   } catch (const InputError& error) {
     return complain(error.what(), 2);
   } catch (const Error& error) {

@@ -22,6 +22,8 @@ namespace wienertree::app {
 CLI::Option* add_count(CLI::App& app, const std::string& name, std::optional<std::uint64_t>& target,
                        std::uint64_t least, const std::string& help,
                        std::uint64_t most = std::numeric_limits<std::uint64_t>::max());
+/// The whole text as a number. @throws InputError naming the option unless it is one, and finite
+double finite_number(const std::string& option, const std::string& text);
 enum class Sign { any, positive };
 /// A finite number.
 CLI::Option* add_number(CLI::App& app, const std::string& name, std::optional<double>& target, Sign sign,
@@ -85,6 +87,11 @@ void set_option(CLI::App& app, const std::string& name, const std::vector<std::s
 /// Parses the words of a command line, the program's name left out.
 /// @throws InputError
 void parse_words(CLI::App& app, std::vector<std::string> words);
+
+/// Ends a subcommand with an exit code when what is to be said has been said.
+struct SaidAlready {
+  int exit_code;
+};
 
 /// Parses and runs; what a subcommand does is done by its callback. Never throws: errors become one line on
 /// standard error.

@@ -10,11 +10,14 @@
 #include "formula_choice.hpp"
 #include "tree_choices.hpp"
 #include "wienertree/cubature/lie_formula.hpp"
-#include "wienertree/weak/smoothing.hpp"
 
 namespace wienertree::app {
 namespace {
 
+const Choices<KinkTreatment> treatments = {{"auto", KinkTreatment::automatic},
+                                           {"last-step", KinkTreatment::last_step},
+                                           {"kernel", KinkTreatment::kernel},
+                                           {"sharp", KinkTreatment::sharp}};
 const Choices<GridKind> grids = {{"uniform", GridKind::uniform}, {"kusuoka", GridKind::kusuoka}};
 constexpr const char* discount_name = "discount_integral";
 
@@ -25,6 +28,31 @@ void add_texts(CLI::App& app, const std::string& name, std::vector<std::string>&
       ->type_name(type)
       ->expected(1)
       ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
+}
+
+// Times as "0.25,0.5,1", or one by one.
+void add_horizons(CLI::App& app, std::vector<double>& target) {
+  app.add_option_function<std::vector<std::string>>(
+         "--horizon",
+         [&target](const std::vector<std::string>& texts) {
+           target.clear();
+           for (const std::string& text : texts)
+             for (std::size_t begin = 0; begin <= text.size();) {
+               const std::size_t comma = std::min(text.find(',', begin), text.size());
+               const std::string one = text.substr(begin, comma - begin);
+               const double t = finite_number("--horizon", one);
+               if (!(t > 0)) throw InputError("must be positive", "--horizon", one);
+               if (!target.empty() && !(t > target.back()))
+                 throw InputError("must ascend from time to time", "--horizon", one);
+               target.push_back(t);
+               begin = comma + 1;
+             }
+         },
+         "T, the time at which it is averaged, or several, T1,T2,..: a row for each from one tree")
+      ->type_name("X[,X..]")
+      ->expected(1)
+      ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll)
+      ->required();
 }
 
 void refuse_if(bool given, const char* option, const std::string& reason) {
@@ -39,14 +67,6 @@ NamedIntegrand named_integrand(const std::string& text, const std::string& optio
   const std::size_t equals = text.find('=');
   if (equals == std::string::npos || equals == 0) throw InputError("must be NAME=EXPR", option, text);
   return {text.substr(0, equals), text.substr(equals + 1)};
-}
-
-BatchFunction discounted(const BatchFunction& payoff, double factor) {
-  if (factor == 1) return payoff;
-  return [payoff, factor](ConstBatchView x, std::span<double> out) {
-    payoff(x, out);
-    for (double& value : out) value *= factor;
-  };
 }
 
 // Recombination needs few nodes, since it keeps moments; random thinning many.
@@ -69,6 +89,36 @@ void refuse_inapplicable(const WeakArguments& a, ThinningMethod thin, bool rando
   refuse_if(a.flow == FlowMethod::exact && a.absolute_tolerance, "--atol", with_exact_flow);
 }
 
+constexpr double default_kink_width = 0.4;
+constexpr double default_patch_width = 1.5;
+// 10 standard deviations of 10^6 steps.
+constexpr std::size_t most_nodes_by_width = 100'000;
+
+// More kinks than this in one payoff are not told apart by their sides.
+constexpr std::size_t most_kinks = 64;
+
+void choose_treatments(const WeakArguments& a, WeakProblem& problem) {
+  KinkTreatment asked = a.kinks.value_or(a.kink_width ? KinkTreatment::kernel : KinkTreatment::automatic);
+  if (asked == KinkTreatment::kernel && a.kink_width == 0.0) asked = KinkTreatment::sharp;
+  refuse_if(a.kink_width && a.kinks && *a.kinks != KinkTreatment::kernel, "--kink-width",
+            "has meaning only with --kinks kernel");
+  const bool scales_wanted = asked == KinkTreatment::automatic || asked == KinkTreatment::kernel;
+  problem.scales.resize(problem.kinked.size());
+  if (scales_wanted)
+    problem.scales = kink_scales(problem.source.model(), problem.kinked, a.horizon(), problem.discount_state);
+  for (std::size_t i = 0; i < problem.kinked.size(); ++i) {
+    const KinkedFunction& f = problem.kinked[i];
+    KinkTreatment& treatment = problem.treatment.emplace_back(asked);
+    if (f.kinks.empty()) treatment = KinkTreatment::sharp;
+    if (treatment == KinkTreatment::last_step && f.kinks.size() > most_kinks)
+      throw InputError("has more than 64 kinks: --kinks kernel", "--payoff", problem.payoffs[i]);
+    if (treatment != KinkTreatment::automatic) continue;
+    treatment = last_step_smooths(problem.scales[i]) && f.kinks.size() <= most_kinks
+                    ? KinkTreatment::last_step
+                    : KinkTreatment::kernel;
+  }
+}
+
 // Below this many nodes, threads wait for each other longer than they work.
 constexpr std::size_t nodes_worth_threads = 5000;
 
@@ -78,7 +128,7 @@ void add_weak_options(CLI::App& app, WeakArguments& a) {
   app.add_option("MODEL", a.model, "A bundled model or a TOML file")->required();
   add_texts(app, "--payoff", a.payoffs, "EXPR",
             "What is averaged: an expression of states and parameters; may be repeated");
-  add_number(app, "--horizon", a.horizon, Sign::positive, "T, the time at which it is averaged")->required();
+  add_horizons(app, a.horizons);
   add_count(app, "--steps", a.steps, 1, "Steps of the tree", 1'000'000);
   add_count(app, "--degree", a.degree, 1, "Degree of the cubature formula [5]", 99);
   add_text(app, "--formula", a.formula, "NAME|FILE", "The cubature formula itself, instead of --degree");
@@ -87,6 +137,8 @@ void add_weak_options(CLI::App& app, WeakArguments& a) {
              "Exponent of Kusuoka's grid t_i = T (1 - (1 - i/n)^gamma) [degree]");
   add_choice(app, "--thin", a.thin, thinnings, "How nodes are thinned out [recombination]");
   add_count(app, "--nodes", a.nodes, 1, "Nodes kept at each step [by thinning and dimension]", 1'000'000'000);
+  add_number(app, "--patch-width", a.patch_width, Sign::positive,
+             "Width of the patches of recombination in standard deviations of one step, for one state [1.5]");
   add_choice(app, "--order", a.order, orders, "Order in which random thinning visits nodes [spatial]");
   add_count(app, "--recombination-degree", a.recombination_degree, 1,
             "Moments that recombination keeps [by dimension]", 99);
@@ -97,8 +149,13 @@ void add_weak_options(CLI::App& app, WeakArguments& a) {
             "Adds the state average_STATE (or NAME), the time average over [0, T]; may be repeated");
   add_texts(app, "--integral", a.integrals, "NAME=EXPR",
             "Adds the state NAME, the integral over [0, T]; may be repeated");
-  add_number(app, "--kink-width", a.kink_width, Sign::any,
-             "Standard deviations over which max, min and abs in payoffs are smoothed; 0: not [0.4]");
+  add_choice(
+      app, "--kinks", a.kinks, treatments,
+      "How kinks and jumps of payoffs are averaged: by the law of the last step, smoothed, as they are "
+      "[auto]");
+  add_number(
+      app, "--kink-width", a.kink_width, Sign::any,
+      "Standard deviations over which max, min and abs are smoothed by --kinks kernel; 0: sharp [0.4]");
   add_text(app, "--discount", a.discount, "EXPR", "Payoffs are multiplied by exp(-integral of EXPR)");
   add_number(app, "--tolerance", a.tolerance, Sign::positive,
              "Chooses steps, degree, nodes or launches for this error, and estimates it part by part");
@@ -119,6 +176,9 @@ WeakProblem weak_problem(const WeakArguments& a, const TextModel& model) {
   if (a.kink_width && *a.kink_width < 0)
     throw InputError("must not be negative", "--kink-width", fmt::format("{}", *a.kink_width));
   if (a.payoffs.empty()) throw InputError("is needed at least once", "--payoff");
+  if (a.horizons.size() > 1 && !a.averages.empty())
+    throw InputError("has one time to divide by, not several: take --integral", "--average",
+                     a.averages.front());
   std::vector<RunningIntegral> integrals;
   for (const std::string& text : a.integrals) {
     const auto [name, expression] = named_integrand(text, "--integral");
@@ -129,9 +189,9 @@ WeakProblem weak_problem(const WeakArguments& a, const TextModel& model) {
     const auto [name, expression] =
         named ? named_integrand(text, "--average") : NamedIntegrand{"average_" + text, text};
     model.compile(expression, "--average");  // for the place of a mistake in it
-    integrals.push_back({name, fmt::format("({})/({:.17g})", expression, *a.horizon), "--average"});
+    integrals.push_back({name, fmt::format("({})/({:.17g})", expression, a.horizon()), "--average"});
   }
-  WeakProblem problem{model, {}, a.payoffs, {}, 0, {}};
+  WeakProblem problem{model, {}, a.payoffs, {}, {}, {}, 0, {}};
   if (a.discount) {
     if (const auto constant = model.constant(*a.discount, "--discount")) {
       problem.discount_rate = *constant;
@@ -146,28 +206,48 @@ WeakProblem weak_problem(const WeakArguments& a, const TextModel& model) {
   for (const RunningIntegral& integral : integrals) problem.added.push_back(integral.name);
   for (const std::string& payoff : a.payoffs)
     problem.kinked.push_back(problem.source.compile_kinked(payoff, "--payoff"));
+  choose_treatments(a, problem);
   return problem;
 }
 
-double kink_width(const WeakArguments& a, const WeakProblem& problem) {
-  const bool kinks = std::any_of(problem.kinked.begin(), problem.kinked.end(),
-                                 [](const KinkedFunction& f) { return !f.kinks.empty(); });
-  return kinks ? a.kink_width.value_or(0.4) : 0;
-}
-
-std::vector<std::vector<BatchFunction>> averaged_payoffs(const WeakArguments& a, const WeakProblem& problem,
-                                                         std::size_t rungs) {
-  const double width = kink_width(a, problem), factor = std::exp(-problem.discount_rate * *a.horizon);
-  std::vector<std::vector<double>> deviations(problem.kinked.size());
-  if (width > 0)
-    deviations = kink_deviations(problem.source.model(), problem.kinked, *a.horizon, problem.discount_state);
-  std::vector<std::vector<BatchFunction>> averaged;
-  for (std::size_t k = 0; k < (width > 0 ? rungs : 1); ++k) {
-    averaged.push_back(
-        smooth_payoffs(problem.kinked, deviations, width * std::exp2(-static_cast<double>(k) / 4)));
-    for (BatchFunction& payoff : averaged.back()) payoff = discounted(payoff, factor);
+std::vector<std::vector<WeakPayoff>> averaged_payoffs(const WeakArguments& a, const WeakProblem& problem,
+                                                      std::size_t rungs) {
+  const bool kernel = std::find(problem.treatment.begin(), problem.treatment.end(), KinkTreatment::kernel) !=
+                      problem.treatment.end();
+  std::vector<std::vector<WeakPayoff>> averaged;
+  for (std::size_t rung = 0; rung < (kernel ? rungs : 1); ++rung) {
+    std::vector<WeakPayoff>& payoffs = averaged.emplace_back();
+    for (std::size_t i = 0; i < problem.kinked.size(); ++i) {
+      const KinkedFunction& f = problem.kinked[i];
+      const double width =
+          a.kink_width.value_or(default_kink_width) * std::exp2(-static_cast<double>(rung) / 4);
+      if (problem.treatment[i] == KinkTreatment::last_step)
+        payoffs.emplace_back(f);
+      else if (problem.treatment[i] == KinkTreatment::kernel)
+        payoffs.emplace_back(smooth_payoff(f, problem.scales[i], width));
+      else
+        payoffs.emplace_back(f.exact);
+      payoffs.back().discount_rate = problem.discount_rate;
+    }
   }
   return averaged;
+}
+
+void note_kinks(const WeakArguments& a, const WeakProblem& problem, Json& options) {
+  std::optional<KinkTreatment> common;
+  bool kinks = false, kernel = false;
+  for (std::size_t i = 0; i < problem.kinked.size(); ++i) {
+    if (problem.kinked[i].kinks.empty()) continue;
+    if (!kinks)
+      common = problem.treatment[i];
+    else if (common != problem.treatment[i])
+      common.reset();
+    kinks = true;
+    kernel = kernel || problem.treatment[i] == KinkTreatment::kernel;
+  }
+  if (!kinks) return;
+  options["kinks"] = name_of(treatments, common.value_or(KinkTreatment::automatic));
+  if (kernel) options["kink-width"] = a.kink_width.value_or(default_kink_width);
 }
 
 std::vector<CubatureFormula> weak_formulas(const WeakArguments& a, const WeakProblem& problem) {
@@ -177,9 +257,20 @@ std::vector<CubatureFormula> weak_formulas(const WeakArguments& a, const WeakPro
                      *a.formula);
   if (a.degree || a.formula) return {choose_formula(a.degree, a.formula, p)};
   std::vector<CubatureFormula> formulas;
-  for (const int degree : formula_degrees(p))
-    if (degree > 3) formulas.push_back(choose_formula(static_cast<std::uint64_t>(degree), {}, p));
+  // The highest degree has none above it to be compared with.
+  const std::vector<int> degrees = formula_degrees(p);
+  for (const int degree : degrees)
+    if (degree > 3 && (degree < degrees.back() || degree == 5))
+      formulas.push_back(choose_formula(static_cast<std::uint64_t>(degree), {}, p));
   return formulas;
+}
+
+std::vector<CubatureFormula> weak_guards(const WeakProblem& problem) {
+  const std::size_t p = problem.source.model().noise_dimension();
+  std::vector<CubatureFormula> guards;
+  for (const int degree : formula_degrees(p))
+    guards.push_back(choose_formula(static_cast<std::uint64_t>(degree), {}, p));
+  return guards;
 }
 
 DrivenFormula weak_formula(const WeakArguments& a, const WeakProblem& problem) {
@@ -208,6 +299,14 @@ WeakRun weak_run(const WeakArguments& a, const WeakProblem& problem, CubatureFor
   o.formula = std::move(formula);
   const std::size_t folded = problem.discount_state ? 1 : 0;
   o.nodes = a.nodes.value_or(default_nodes(o.thinning.method, model.reported_dimension() - folded));
+  const bool line = model.reported_dimension() - folded == 1;
+  refuse_if(a.patch_width && (o.thinning.method != ThinningMethod::recombination || !line), "--patch-width",
+            "is for recombination where there is one state");
+  refuse_if(a.patch_width && a.nodes, "--patch-width", "decides the number of nodes: give it or --nodes");
+  if (line && o.thinning.method == ThinningMethod::recombination && !a.nodes) {
+    o.patch_width = a.patch_width.value_or(default_patch_width);
+    o.nodes = most_nodes_by_width;
+  }
   o.thinning.order = a.order.value_or(SiteOrder::spatial);
   o.thinning.recombination_degree = static_cast<int>(a.recombination_degree.value_or(0));
   o.flow = a.flow.value_or(FlowMethod::automatic);
@@ -217,11 +316,13 @@ WeakRun weak_run(const WeakArguments& a, const WeakProblem& problem, CubatureFor
   o.discount_state = problem.discount_state;
   for (const KinkedFunction& payoff : problem.kinked)
     if (!payoff.kinks.empty() && !o.finest_along) o.finest_along = payoff.kinks.front();
-  const bool many = o.thinning.method == ThinningMethod::none || o.nodes >= nodes_worth_threads;
+  const bool many =
+      o.thinning.method == ThinningMethod::none || (o.nodes >= nodes_worth_threads && o.patch_width == 0);
   o.threads =
       static_cast<unsigned>(a.threads.value_or(many ? std::max(1U, std::thread::hardware_concurrency()) : 1));
   run.grid = a.grid.value_or(GridKind::uniform);
-  run.horizon = *a.horizon;
+  run.horizon = a.horizon();
+  if (a.horizons.size() > 1) run.horizons = a.horizons;
   run.steps = a.steps.value_or(0);
   run.gamma = a.gamma.value_or(o.formula.degree);
   run.launches = static_cast<std::uint32_t>(a.launches.value_or(1));
@@ -239,13 +340,17 @@ Json options_in_force(const WeakRun& run) {
   const WeakOptions& o = run.options;
   Json json;
   json["horizon"] = run.horizon;
+  if (run.horizons.size() > 1) json["horizon"] = run.horizons;
   json["steps"] = run.steps;
   json["degree"] = o.formula.degree;
   json["formula"] = o.formula.name;
   json["grid"] = name_of(grids, run.grid);
   if (run.grid == GridKind::kusuoka) json["gamma"] = run.gamma;
   json["thin"] = name_of(thinnings, o.thinning.method);
-  if (o.thinning.method != ThinningMethod::none) json["nodes"] = o.nodes;
+  if (o.patch_width > 0)
+    json["patch-width"] = o.patch_width;
+  else if (o.thinning.method != ThinningMethod::none)
+    json["nodes"] = o.nodes;
   if (is_random(o)) json["order"] = name_of(orders, o.thinning.order);
   if (o.thinning.recombination_degree > 0) json["recombination-degree"] = o.thinning.recombination_degree;
   json["flow"] = name_of(flows, o.flow);

@@ -28,8 +28,8 @@ struct WeakCommandArguments {
   bool quiet = false;
 };
 
-Table table_of(const WeakProblem& problem, const std::vector<NamedNumbers>& rows) {
-  Table table{{}, {}, "payoff", problem.payoffs};
+Table table_of(const std::vector<std::string>& payoffs, const std::vector<NamedNumbers>& rows) {
+  Table table{{}, {}, "payoff", payoffs};
   for (const auto& [name, value] : rows.front()) table.columns.push_back(name);
   for (const NamedNumbers& cells : rows) {
     std::vector<double>& row = table.rows.emplace_back();
@@ -51,13 +51,13 @@ Json report_of(const WeakArguments& a, const WeakProblem& problem, const WeakRun
   if (!a.integrals.empty()) options["integral"] = a.integrals;
   if (a.discount) options["discount"] = *a.discount;
   if (a.tolerance) options["tolerance"] = *a.tolerance;
-  if (const double width = kink_width(a, problem); width > 0) options["kink-width"] = width;
+  note_kinks(a, problem, options);
   report["options"] = std::move(options);
   return report;
 }
 
-std::string summary_of(const WeakArguments& a, const WeakProblem& problem, const WeakRun& run,
-                       const std::vector<std::string>& results) {
+std::string summary_of(const WeakArguments& a, const WeakProblem& problem, const WeakOutcome& outcome) {
+  const WeakRun& run = outcome.run;
   std::string text =
       fmt::format("{}, t = {:g}: degree {}, {} step{}\n", problem.source.model().name, run.horizon,
                   run.options.formula.degree, run.steps, run.steps == 1 ? "" : "s");
@@ -68,12 +68,18 @@ std::string summary_of(const WeakArguments& a, const WeakProblem& problem, const
         fmt::format("{}{} {}", separator, name, value.is_string() ? value.get<std::string>() : value.dump());
     separator = ", ";
   }
-  std::size_t width = 0;
-  for (const std::string& payoff : problem.payoffs) width = std::max(width, payoff.size());
   text += "\n\n";
-  for (std::size_t i = 0; i < problem.payoffs.size(); ++i)
-    text += fmt::format("  E[{}]{:{}} = {}\n", problem.payoffs[i], "", width - problem.payoffs[i].size(),
-                        results[i]);
+  std::vector<std::string> names;
+  std::size_t width = 0;
+  for (std::size_t i = 0; i < outcome.payoffs.size(); ++i) {
+    names.push_back(fmt::format("E[{}]", outcome.payoffs[i]));
+    if (run.horizons.size() > 1)
+      names.back() = fmt::format("t = {:g}: {}", outcome.rows[i].front().second, names.back());
+    width = std::max(width, names.back().size());
+  }
+  for (std::size_t i = 0; i < names.size(); ++i)
+    text += fmt::format("  {:{}} = {}\n", names[i], width, outcome.results[i]);
+  for (const std::string& note : outcome.notes) text += fmt::format("  note: {}\n", note);
   return text;
 }
 
@@ -82,7 +88,6 @@ Json identity_of(const WeakArguments& a, const WeakProblem& problem) {
   Json run = run_identity("weak");
   run.update(model_identity(a.model, problem.source.model()));
   run["payoffs"] = a.payoffs;
-  run["kink-width"] = kink_width(a, problem);
   const std::vector<CubatureFormula> formulas =
       a.tolerance ? weak_formulas(a, problem) : std::vector{weak_formula(a, problem).formula};
   for (const CubatureFormula& formula : formulas)
@@ -96,6 +101,12 @@ Json identity_of(const WeakArguments& a, const WeakProblem& problem) {
   note("rtol", a.relative_tolerance);
   note("atol", a.absolute_tolerance);
   return run;
+}
+
+void tell(const WeakArguments& a, const WeakProblem& problem, const WeakOutcome& outcome, double seconds) {
+  const std::string work = fmt::format("\n  {} nodes at the end, {} ODE solves, {:.3g} s\n", outcome.leaves,
+                                       outcome.ode_solves, seconds);
+  std::fputs((summary_of(a, problem, outcome) + work).c_str(), stderr);
 }
 
 void approximate_and_write(const WeakCommandArguments& a) {
@@ -136,15 +147,16 @@ void approximate_and_write(const WeakCommandArguments& a) {
     row.insert(row.end(), {{"nodes", static_cast<double>(outcome.leaves)},
                            {"ode_solves", static_cast<double>(outcome.ode_solves)},
                            {"seconds", took}});
-  const Table table = table_of(problem, outcome.rows);
+  const Table table = table_of(outcome.payoffs, outcome.rows);
   output.stage(a.format.value_or(TableFormat::csv) == TableFormat::csv
                    ? to_csv(table)
                    : to_json(report_of(a.weak, problem, outcome.run), table));
   output.publish();
-  if (a.quiet) return;
-  const std::string work = fmt::format("\n  {} nodes at the end, {} ODE solves, {:.3g} s\n", outcome.leaves,
-                                       outcome.ode_solves, took);
-  std::fputs((summary_of(a.weak, problem, outcome.run, outcome.results) + work).c_str(), stderr);
+  if (!a.quiet) tell(a.weak, problem, outcome, took);
+  if (outcome.warning.empty()) return;
+  std::fputs(fmt::format("warning: tolerance {:g}: {}\n", *a.weak.tolerance, outcome.warning).c_str(),
+             stderr);
+  throw SaidAlready{1};
 }
 
 }  // namespace

@@ -14,8 +14,14 @@ namespace wienertree::app {
 using NamedNumbers = std::vector<std::pair<std::string, double>>;
 
 struct WeakOutcome {
-  std::vector<NamedNumbers> rows;  ///< one a payoff: value, standard_error, and what further options ask for
-  std::vector<std::string> results;  ///< one a payoff, for people
+  /// One a payoff, time by time: value, standard_error, and what further options ask for. With several times
+  /// the first column is `horizon`.
+  std::vector<NamedNumbers> rows;
+  std::vector<std::string> payoffs;  ///< one a row, as given
+  std::vector<std::string> results;  ///< one a row, for people
+  std::vector<std::string> notes;    ///< what the control of the error found
+  /// Not empty: the tolerance was not reached; what limits the accuracy and what to try.
+  std::string warning;
   WeakRun run;
   std::size_t leaves = 0;
   std::uint64_t ode_solves = 0;

@@ -1,3 +1,4 @@
+#include <fmt/format.h>
 #include <pybind11/stl.h>
 
 #include <chrono>
@@ -30,7 +31,6 @@ py::object weak(const py::object& source, const py::object& payoff, py::kwargs o
   const py::object set =
       options.contains("set") ? py::object(options.attr("pop")("set")) : py::object(py::none());
   const PyModel model = PyModel::make(source, assignments_of(set));
-  const bool one = py::isinstance<py::str>(payoff);
   options["payoff"] = payoff;
   CLI::App app("", "weak");
   app::WeakArguments arguments;
@@ -38,7 +38,8 @@ py::object weak(const py::object& source, const py::object& payoff, py::kwargs o
   if (const auto formula = take_formula(options))
     throw InputError("is given by name or file here: save it first", "--formula", formula->name);
   set_options(app, options);
-  if (!arguments.horizon) throw InputError("is needed", "--horizon");
+  if (arguments.horizons.empty()) throw InputError("is needed", "--horizon");
+  const bool one = py::isinstance<py::str>(payoff) && arguments.horizons.size() == 1;
   const auto began = std::chrono::steady_clock::now();
   const app::WeakProblem problem = app::weak_problem(arguments, model.text());
   const app::WeakOutcome o = [&] {
@@ -49,6 +50,9 @@ py::object weak(const py::object& source, const py::object& payoff, py::kwargs o
                ? app::weak_to_tolerance(arguments, problem, observer)
                : app::weak_with_steps(arguments, problem, app::weak_formula(arguments, problem), 0, observer);
   }();
+  if (!o.warning.empty())
+    py::module_::import("warnings")
+        .attr("warn")(fmt::format("tolerance {:g}: {}", *arguments.tolerance, o.warning));
   const std::chrono::duration<double> took = std::chrono::steady_clock::now() - began;
   py::object split = py::none();
   if (arguments.tolerance) {
@@ -77,6 +81,8 @@ void add_weak(py::module_& module) {
 model: a Model, or what makes one (a bundled name, a file, a text, a dict).
 payoff: an expression of states and parameters, or a list of them.
 set: values that replace parameters of the model, {"kappa": 1.5}.
+horizon: a time, or several, ascending. Where a tolerance is not reached the best value is returned, with a
+    UserWarning that says what limits it.
 
 The options of the command line, under the same names:
 

@@ -87,7 +87,8 @@ class FilterResult(Mapping[str, Array]):
 
 @dataclass(frozen=True)
 class WeakResult:
-    """Averages of payoffs: numbers for one payoff, arrays for a list of them."""
+    """Averages of payoffs: numbers for one payoff at one horizon, else arrays: payoff by payoff, horizon by
+    horizon."""
 
     value: Any
     standard_error: Any  # 0 where nothing is random

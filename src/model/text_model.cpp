@@ -8,6 +8,7 @@
 #include <fstream>
 
 #include "wienertree/model/text/assembly.hpp"
+#include "wienertree/model/text/branches.hpp"
 #include "wienertree/model/text/exact_filter.hpp"
 #include "wienertree/model/text/smoothing.hpp"
 #include "wienertree/numeric/read_all.hpp"
@@ -132,11 +133,14 @@ ModelAnalysis TextModel::analysis() const {
 
 namespace {
 
-BatchFunction batch_function(text::Expression e, std::size_t d, std::vector<double> uniforms) {
-  TapeBuilder builder(d, uniforms.size());
+// Observations are `uniforms`, or with `further` components of x after the d states, those.
+BatchFunction batch_function(text::Expression e, std::size_t d, std::vector<double> uniforms,
+                             std::size_t further = 0) {
+  TapeBuilder builder(d + further, uniforms.size());
   text::TapeSymbols symbols;
   for (std::size_t i = 0; i < d; ++i) symbols.states.push_back(builder.input(i));
   for (std::size_t i = 0; i < uniforms.size(); ++i) symbols.observations.push_back(builder.uniform(i));
+  for (std::size_t i = 0; i < further; ++i) symbols.observations.push_back(builder.input(d + i));
   const TapeBuilder::Value output = text::emit(e, symbols, builder);
   return [tape = builder.finish(std::span(&output, 1)), uniforms = std::move(uniforms)](
              ConstBatchView x, std::span<double> out) {
@@ -167,14 +171,30 @@ KinkedFunction TextModel::compile_kinked(std::string_view expression, const std:
   const text::Expression e = bound_expression(expression, where, *arena);
   const std::size_t d = contents_->model.state_dimension();
   const text::SmoothedKinks smoothed = text::smooth_kinks(e, *arena);
-  KinkedFunction function{batch_function(e, d, {}), {}, {}};
-  for (const text::Expression argument : smoothed.arguments)
+  const text::Branches branches = text::branches_of(e, *arena);
+  KinkedFunction function;
+  function.exact = batch_function(e, d, {});
+  for (const text::Expression argument : branches.exact)
     function.kinks.push_back(batch_function(argument, d, {}));
-  function.smoothed = [arena, value = smoothed.value, d](std::span<const double> widths) {
+  const auto bound_to = [arena, d](text::Expression value, std::span<const double> numbers) {
+    return batch_function(value, d, std::vector<double>(numbers.begin(), numbers.end()));
+  };
+  function.smoothed = [bound_to, value = smoothed.value](std::span<const double> widths) {
     std::vector<double> inverse;
     for (const double width : widths) inverse.push_back(1 / width);
-    return batch_function(value, d, std::move(inverse));
+    return bound_to(value, inverse);
   };
+  function.branch = [bound_to, value = branches.value](std::span<const double> above) {
+    return bound_to(value, above);
+  };
+  function.argument_branch = [bound_to, arguments = branches.arguments](std::size_t k,
+                                                                        std::span<const double> above) {
+    return bound_to(arguments[k], above);
+  };
+  if (branches.exact == branches.arguments)
+    function.with_argument = [arena, e, exact = branches.exact, d](std::size_t k) {
+      return batch_function(text::with_argument(e, exact[k], *arena), d, {}, 1);
+    };
   return function;
 }
 

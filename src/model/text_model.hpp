@@ -73,8 +73,9 @@ class TextModel {
   /// @throws InputError with the column of the offending symbol
   BatchFunction compile(std::string_view expression, const std::string& where) const;
 
-  /// The same with its kinks, where max, min or abs are not differentiable: over a smooth law the average of
-  /// the smoothed function differs by O(h^12), h the width of smoothing (text/smoothing.hpp has the kernel).
+  /// The same with its kinks and jumps, where max, min, abs, sign, a comparison or `if` are not smooth: the
+  /// smooth branches on either side (text/branches.hpp), and a smoothed function, whose average over a smooth
+  /// law differs by O(h^12), h the width of smoothing (text/smoothing.hpp has the kernel).
   KinkedFunction compile_kinked(std::string_view expression, const std::string& where) const;
   /// The value of an expression in which no state occurs, nor t; nothing if one does. Otherwise as `compile`.
   std::optional<double> constant(std::string_view expression, const std::string& where) const;

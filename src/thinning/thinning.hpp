@@ -62,6 +62,10 @@ struct Sites {
   std::span<const double> log_weight;
   std::size_t parents = 0;        ///< 0: visit in storage order
   ThreadPool* threads = nullptr;  ///< to work on, if any; results do not depend on it
+  /// d x M or empty: the scale of each component at each site, its standard deviation over the next step, say.
+  /// Recombination then measures distances in it.
+  ConstBatchView deviation = {};
+  double width = 0;  ///< of patches, in these; 0: by the budget alone
 };
 
 class Thinning {

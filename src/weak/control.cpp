@@ -4,11 +4,14 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <map>
+#include <utility>
 
 #include "wienertree/cubature/verification.hpp"
 #include "wienertree/tree/initial.hpp"
 #include "wienertree/tree/tree_size.hpp"
+#include "wienertree/weak/dynamics.hpp"
 #include "wienertree/weak/levels.hpp"
 
 namespace wienertree {
@@ -22,36 +25,112 @@ double largest_difference(const std::vector<double>& a, const std::vector<double
 
 double order_of(const CubatureFormula& formula) { return (formula.degree - 1) / 2.0; }
 
+// What ends a computation that has not reached its tolerance, with the reason.
+struct Exhausted {
+  std::string reason;
+};
+
+constexpr std::size_t enough_carriers = 8, enough_steps = 64;
+constexpr double finer_width = 1.25;
+
 class Control {
  public:
-  Control(const Model& model, const std::vector<std::vector<BatchFunction>>& rungs, WeakRun run,
+  Control(const Model& model, const std::vector<std::vector<WeakPayoff>>& rungs, WeakRun run,
           const WeakTarget& target)
       : model_(model),
-        count_(rungs.front().size()),
+        payoffs_a_rung_(rungs.front().size()),
         rungs_(rungs.size()),
+        times_(std::max<std::size_t>(1, run.horizons.size())),
         run_(std::move(run)),
         target_(target),
-        random_(is_random(run_.options)) {
+        random_(is_random(run_.options)),
+        by_width_(run_.options.patch_width > 0) {
     for (const auto& rung : rungs) payoffs_.insert(payoffs_.end(), rung.begin(), rung.end());
   }
 
   ControlledResult operator()() {
+    for (const BoundTrouble& trouble : bound_troubles(model_))
+      if (reaches(trouble)) best_.notes.push_back(trouble.reason);
+    bounds_fail_ = !best_.notes.empty();
     choose_formula();
     measure_ode_error(target_.choose_accuracy ? 4 : 0);
-    run_.steps = 4;
+    run_.steps = fewest_steps();
     // One node can only be compared with two.
     fewer_nodes_ = run_.options.nodes > 1 ? std::max<std::size_t>(1, 2 * run_.options.nodes / 3) : 2;
     if (!random_) run_.launches = 1;
     if (random_ && target_.choose_launches) run_.launches = 16;
-    for (estimate(); !within(); estimate()) refine();
-    return finish();
+    try {
+      for (;;) {
+        estimate_or_shorten();
+        keep_best();
+        if (bounds_fail_ && (within() || run_.steps >= enough_steps))
+          give_up(best_.notes.front() +
+                  ": nothing is known of the error. Write the state in other coordinates (a square root), or "
+                  "without `boundary`");
+        if (!within())
+          refine();
+        else if (guarded())
+          break;
+      }
+      best_.reached = true;
+    } catch (const Exhausted& exhausted) {
+      best_.limit = exhausted.reason;
+    }
+    best_.ode_solves = solves();
+    return std::move(best_);
   }
 
  private:
+  std::size_t value_count() const { return payoffs_a_rung_ * times_; }
+  // Where payoff and time k of a rung stand among the values of a tree.
+  std::size_t place(std::size_t rung, std::size_t k) const {
+    return (k / payoffs_a_rung_) * payoffs_a_rung_ * rungs_ + rung * payoffs_a_rung_ + k % payoffs_a_rung_;
+  }
+
+  // Whether mass arrives at the bound within 16 steps of degree 5 or so: more than a payoff of the size of the
+  // tolerance would feel.
+  bool reaches(const BoundTrouble& trouble) const {
+    WeakRun run = run_;
+    run.options.formula = target_.formulas.front();
+    run.steps = steps_of_level(run_, 16);
+    run.launches = 1;
+    const BatchFunction held = [trouble](ConstBatchView x, std::span<double> out) {
+      const double slack = 1e-9 * (1 + std::abs(trouble.at));
+      for (std::size_t n = 0; n < out.size(); ++n)
+        out[n] = trouble.upper ? (x(trouble.state, n) >= trouble.at - slack ? 1 : 0)
+                               : (x(trouble.state, n) <= trouble.at + slack ? 1 : 0);
+    };
+    std::vector<WeakPayoff> payoffs = payoffs_;
+    payoffs.emplace_back(held);
+    try {
+      const std::vector<double> value = run_weak(model_, payoffs, run).value;
+      double size = 1;
+      for (std::size_t i = 0; i + 1 < payoffs.size(); ++i) size = std::max(size, std::abs(value[i]));
+      return value[payoffs.size() - 1] * size > target_.tolerance / 100;
+    } catch (const RunError&) {
+      return true;
+    }
+  }
+
+  // A step of half of 1/rate. In several dimensions trees of many steps are dear: guards must do from 32 on.
+  std::size_t fewest_steps() {
+    const double wanted = 2 * fastest_rate(model_, run_.horizon) * run_.horizon;
+    const double most = model_.reported_dimension() > 1 ? 32 : 512;
+    // Below a level of 8 steps, intervals between times do not all double with the level.
+    const std::size_t least = times_ > 1 ? 8 : 4;
+    std::size_t n = least;
+    while (static_cast<double>(steps_of_level(run_, n)) < wanted && static_cast<double>(n) < most) n *= 2;
+    if (n > least)
+      best_.notes.push_back(
+          fmt::format("at least {} steps, for the fastest rate of the model is {:.3g} per unit of time",
+                      steps_of_level(run_, n), wanted / (2 * run_.horizon)));
+    return n;
+  }
+
   // Trees of 2 steps are grown whole where they are small, so that no thinning blurs what they show.
   WeakLevels levels_of_two_steps(WeakRun run) const {
     const std::size_t roots = first_generation(model_, run.options.nodes).size();
-    if (unpruned_size(run.options.formula, model_, 2, roots).leaves <= 1e5)
+    if (unpruned_size(run.options.formula, model_, steps_of_level(run, 2), roots).leaves <= 1e5)
       run.options.thinning.method = ThinningMethod::none;
     return {model_, payoffs_, std::move(run)};
   }
@@ -70,24 +149,29 @@ class Control {
   }
 
   void choose_formula() {
-    const CubatureFormula* best = &target_.formulas.front();
-    double least = target_.formulas.size() > 1 ? promised_work(*best) : 0;
-    for (std::size_t i = 1; i < target_.formulas.size(); ++i) {
+    const CubatureFormula* best = nullptr;
+    double least = std::numeric_limits<double>::infinity();
+    for (const CubatureFormula& formula : target_.formulas) {
+      if (target_.formulas.size() == 1) best = &formula;
       // One step may not cost more than the whole of what is known to do.
-      const auto least_possible = 2 * static_cast<double>(total_segments(target_.formulas[i]));
-      if (least_possible >= least) continue;
-      const double work = promised_work(target_.formulas[i]);
-      if (work >= least) continue;
-      least = work;
-      best = &target_.formulas[i];
+      if (best != nullptr && 2 * static_cast<double>(total_segments(formula)) >= least) continue;
+      if (target_.formulas.size() == 1) break;
+      try {
+        const double work = promised_work(formula);
+        if (work >= least) continue;
+        least = work;
+        best = &formula;
+      } catch (const RunError&) {  // steps this long leave the domain
+      }
     }
-    run_.options.formula = *best;
+    // No formula can make 2 steps: the shortest paths of all, then.
+    run_.options.formula = best != nullptr ? *best : target_.formulas.front();
   }
 
   // Makes the flow more accurate, a hundredfold each of `attempts` times at most, until 16 steps, which are
   // many for a formula that was chosen for its order, leave a tenth of the tolerance.
   void measure_ode_error(int attempts) {
-    ode_.assign(payoffs_.size(), 0.0);
+    ode_.assign(payoffs_.size() * times_, 0.0);
     if (run_.options.flow == FlowMethod::exact) return;
     const double steps = static_cast<double>(std::max<std::size_t>(16, run_.steps));
     for (int attempt = 0;; ++attempt) {
@@ -95,55 +179,87 @@ class Control {
       finer.options.tolerance.relative /= 100;
       finer.options.tolerance.absolute /= 100;
       WeakLevels now = levels_of_two_steps(run_), then = levels_of_two_steps(finer);
-      const std::vector<double> value = now.value(2), better = then.value(2);
+      std::size_t n = 2;
+      for (;; n *= 4) try {
+          now.value(n);
+          then.value(n);
+          break;
+        } catch (const RunError&) {
+          if (n >= enough_steps) throw;
+        }
+      const std::vector<double> value = now.value(n), better = then.value(n);
       pilot_solves_ += now.ode_solves() + then.ode_solves();
-      for (std::size_t i = 0; i < ode_.size(); ++i) ode_[i] = std::abs(value[i] - better[i]);
-      if (largest_difference(value, better) * steps / 2 <= target_.tolerance / 10 || attempt >= attempts)
+      for (std::size_t i = 0; i < ode_.size(); ++i)
+        ode_[i] = std::abs(value[i] - better[i]) * 2 / static_cast<double>(n);
+      if (largest_difference(value, better) * steps / static_cast<double>(n) <= target_.tolerance / 10 ||
+          attempt >= attempts)
         return;
       run_ = finer;
     }
   }
 
-  WeakLevels& at_nodes(std::size_t nodes) {
-    auto found = levels_.find(nodes);
+  WeakLevels& at(std::size_t nodes, double width) {
+    auto found = levels_.find({nodes, width});
     if (found == levels_.end()) {
       WeakRun run = run_;
       run.options.nodes = nodes;
-      found = levels_.emplace(nodes, WeakLevels(model_, payoffs_, run)).first;
+      run.options.patch_width = width;
+      found = levels_.emplace(std::pair{nodes, width}, WeakLevels(model_, payoffs_, run)).first;
     }
     found->second.set_launches(run_.launches);
     return found->second;
   }
+  WeakLevels& trees_now() { return at(run_.options.nodes, run_.options.patch_width); }
 
-  // The first payoff of the rung that is taken.
-  std::size_t first_of_rung(const std::vector<double>& X) const {
+  // The rung that is taken.
+  std::size_t rung_of(const std::vector<double>& X) const {
     for (std::size_t rung = 0; rung + 2 < rungs_; ++rung) {
       double change = 0;
-      for (std::size_t i = rung * count_; i < (rung + 1) * count_; ++i)
-        change = std::max(change, std::abs(X[i] - X[i + count_]));
-      if (change <= target_.tolerance / 4) return rung * count_;
+      for (std::size_t k = 0; k < value_count(); ++k)
+        change = std::max(change, std::abs(X[place(rung, k)] - X[place(rung + 1, k)]));
+      if (change <= target_.tolerance / 4) return rung;
     }
-    return rungs_ > 1 ? (rungs_ - 2) * count_ : 0;
+    return rungs_ > 1 ? rungs_ - 2 : 0;
+  }
+
+  // Steps that leave the domain are halved.
+  void estimate_or_shorten() {
+    for (;;) try {
+        return estimate();
+      } catch (const RunError&) {
+        if (run_.steps >= enough_steps) throw;
+        run_.steps *= 2;
+      }
   }
 
   void estimate() {
-    const std::size_t n = run_.steps, N = run_.options.nodes;
-    WeakLevels& trees = at_nodes(N);
+    const std::size_t n = run_.steps;
+    WeakLevels& trees = trees_now();
     const std::vector<double> X = trees.extrapolated(n), X_half = trees.extrapolated(n / 2),
                               deviation = trees.standard_error(n);
     std::vector<std::vector<double>> V;
-    for (std::size_t m = n; m >= 1 && V.size() < 4; m /= 2) V.push_back(trees.value(m));
-    const std::size_t first = first_of_rung(X);
-    result_.value.assign(count_, 0.0);
-    result_.standard_error.assign(count_, 0.0);
-    result_.error.assign(count_, {});
-    for (std::size_t k = 0; k < count_; ++k) {
-      const std::size_t i = first + k;
+    for (std::size_t m = n; m >= 1 && V.size() < 4; m /= 2) {
+      if (V.size() < 3) {
+        V.push_back(trees.value(m));
+        continue;
+      }
+      try {
+        V.push_back(trees.value(m));
+      } catch (const RunError&) {  // so long a step leaves the domain; three levels do
+      }
+    }
+    const std::size_t rung = rung_ = rung_of(X);
+    result_.value.assign(value_count(), 0.0);
+    result_.standard_error.assign(value_count(), 0.0);
+    result_.error.assign(value_count(), {});
+    for (std::size_t k = 0; k < value_count(); ++k) {
+      const std::size_t i = place(rung, k);
       WeakErrorSplit& error = result_.error[k];
       std::vector<double> of_payoff;
       for (const std::vector<double>& values : V) of_payoff.push_back(values[i]);
       error.discretisation = discretisation_estimate(of_payoff, run_.options.formula.degree);
-      if (rungs_ > 1) error.discretisation += std::abs(X[i] - X[i + count_]) * 4 / 3;
+      if (bounds_fail_) error.discretisation = std::max(error.discretisation, std::abs(X[i]));
+      if (rungs_ > 1) error.discretisation += std::abs(X[i] - X[place(rung + 1, k)]) * 4 / 3;
       error.ode = ode_[i] * static_cast<double>(n) / 2;
       error.sampling = 2 * deviation[i];
       result_.value[k] = X[i];
@@ -151,17 +267,108 @@ class Control {
     }
     result_.leaves = trees.leaves(n);
     if (random_ || run_.options.thinning.method == ThinningMethod::none) return;
-    WeakLevels& other = at_nodes(fewer_nodes_);
+    WeakLevels& other = by_width_ ? at(run_.options.nodes, finer_width * run_.options.patch_width)
+                                  : at(fewer_nodes_, run_.options.patch_width);
     const std::vector<double> Y = other.extrapolated(n), Y_half = other.extrapolated(n / 2);
-    for (std::size_t k = 0; k < count_; ++k) {
-      const std::size_t i = first + k;
+    for (std::size_t k = 0; k < value_count(); ++k) {
+      const std::size_t i = place(rung, k);
       result_.error[k].thinning = std::max(std::abs(X[i] - Y[i]), std::abs(X_half[i] - Y_half[i]));
     }
   }
 
-  bool within() const {
-    return std::all_of(result_.error.begin(), result_.error.end(),
-                       [&](const WeakErrorSplit& e) { return e.total() <= target_.tolerance; });
+  static double total_of(const ControlledResult& result) {
+    double most = 0;
+    for (const WeakErrorSplit& e : result.error) most = std::max(most, e.total());
+    return most;
+  }
+
+  // What the guards added counts: a result without it is no better.
+  void keep_best() {
+    if (!best_.value.empty() && total_of(best_) < total_of(result_)) return;
+    best_.value = result_.value;
+    best_.standard_error = result_.standard_error;
+    best_.error = result_.error;
+    best_.leaves = result_.leaves;
+    best_.run = run_;
+    best_.run.richardson = true;
+    best_.run.steps = steps_of_level(run_, run_.steps);
+  }
+
+  bool within() const { return total_of(result_) <= target_.tolerance; }
+
+  // Whether nothing speaks against the estimates; else what does has been made finer.
+  bool guarded() {
+    if (trees_now().carriers(run_.steps) < enough_carriers && run_.steps < enough_steps) {
+      double_steps();
+      return false;
+    }
+    compare_degrees();
+    force_best();
+    if (!within()) {
+      if (random_) return true;
+      double_steps();
+      return false;
+    }
+    if (recombination_differs()) {
+      if (!target_.choose_nodes)
+        give_up("thinning is not to be trusted with so few nodes: give more --nodes");
+      add_nodes();
+      return false;
+    }
+    return true;
+  }
+
+  void force_best() {
+    best_.value.clear();
+    keep_best();
+  }
+
+  void compare_degrees() {
+    if (target_.guards.empty()) return;
+    const int degree = run_.options.formula.degree;
+    const CubatureFormula *higher = nullptr, *lower = nullptr;
+    for (const CubatureFormula& guard : target_.guards) {
+      if (guard.degree < degree) lower = &guard;
+      if (guard.degree > degree && higher == nullptr) higher = &guard;
+    }
+    // Trees of n and n/2 steps.
+    const double once = static_cast<double>(trees_now().ode_solves(run_.steps)) /
+                        static_cast<double>(total_segments(run_.options.formula));
+    const auto affordable = [&](const CubatureFormula* guard, double steps) {
+      return guard != nullptr && static_cast<double>(solves()) +
+                                         1.5 * steps * once * static_cast<double>(total_segments(*guard)) <=
+                                     target_.most_solves;
+    };
+    const CubatureFormula* guard = affordable(higher, 1) ? higher : affordable(lower, 2) ? lower : nullptr;
+    if (guard == nullptr)
+      give_up(fmt::format("a comparison with another degree would take over {:.2g} ODE solves",
+                          target_.most_solves));
+    WeakRun run = run_;
+    run.options.formula = *guard;
+    WeakLevels levels(model_, payoffs_, run);
+    const std::vector<double> Y = levels.extrapolated(guard == higher ? run_.steps : 2 * run_.steps);
+    pilot_solves_ += levels.ode_solves();
+    for (std::size_t k = 0; k < value_count(); ++k) {
+      double& error = result_.error[k].discretisation;
+      // The other value may be off by a quarter of the difference, on the far side.
+      error = std::max(error, std::abs(result_.value[k] - Y[place(rung_, k)]) * 4 / 3);
+    }
+  }
+
+  bool recombination_differs() {
+    const std::size_t d = model_.reported_dimension() - (run_.options.discount_state ? 1 : 0);
+    ThinningOptions& thinning = run_.options.thinning;
+    if (thinning.method != ThinningMethod::recombination || d < 2 || thinning.own) return false;
+    WeakRun run = run_;
+    const int usual = thinning.recombination_degree > 0 ? thinning.recombination_degree : d == 2 ? 5 : 3;
+    run.options.thinning.recombination_degree = usual > 3 ? 3 : 2;
+    WeakLevels levels(model_, payoffs_, run);
+    const std::vector<double> Y = levels.value(run_.steps), V = trees_now().value(run_.steps);
+    pilot_solves_ += levels.ode_solves();
+    double most = 0;
+    for (std::size_t k = 0; k < value_count(); ++k)
+      most = std::max(most, std::abs(V[place(rung_, k)] - Y[place(rung_, k)]));
+    return most > target_.tolerance;
   }
 
   double largest(double WeakErrorSplit::*part) const {
@@ -186,12 +393,18 @@ class Control {
       return;
     }
     if (ode > e) give_up("that of the ODEs grows with the steps: take a smaller --rtol and --atol");
-    if (thinning > e && !target_.choose_nodes) give_up("that of thinning needs more --nodes");
+    if (thinning > e && !target_.choose_nodes)
+      give_up("that of thinning needs more --nodes or a smaller --patch-width");
     // Noise may make up 4 of its own size of what the steps seem to leave.
     if (random_ && sampling >= steps / 4) return sample_more(sampling);
     // The same for thinning.
     if (thinning > steps / 2 && target_.choose_nodes) return add_nodes();
-    if (run_.options.thinning.method == ThinningMethod::none) refuse_whole_tree(2 * run_.steps);
+    double_steps();
+  }
+
+  void double_steps() {
+    if (run_.options.thinning.method == ThinningMethod::none)
+      refuse_whole_tree(steps_of_level(run_, 2 * run_.steps));
     allow(2);
     run_.steps *= 2;
   }
@@ -210,6 +423,11 @@ class Control {
   // By half; the trees there are become those to compare with.
   void add_nodes() {
     allow(1.5 * 7 / 4);  // trees of n, n/2 and n/4 steps
+    if (by_width_) {
+      if (run_.options.patch_width < 0.05) give_up("narrower patches do not help");
+      run_.options.patch_width /= finer_width;
+      return;
+    }
     fewer_nodes_ = run_.options.nodes;
     run_.options.nodes += std::max<std::size_t>(1, run_.options.nodes / 2);
   }
@@ -222,7 +440,7 @@ class Control {
 
   // Before work of `factor` times the largest tree, all launches of it.
   void allow(double factor) {
-    const auto finest = static_cast<double>(at_nodes(run_.options.nodes).ode_solves(run_.steps));
+    const auto finest = static_cast<double>(trees_now().ode_solves(run_.steps));
     if (static_cast<double>(solves()) + factor * finest > target_.most_solves)
       give_up(fmt::format("more would take over {:.2g} ODE solves", target_.most_solves));
   }
@@ -238,33 +456,26 @@ class Control {
   }
 
   [[noreturn]] void give_up(const std::string& reason) const {
-    throw RunError(
+    throw Exhausted{
         fmt::format("not reached by degree {} in {} steps: errors of about {:.1e} by the steps, {:.1e} by "
                     "thinning, {:.1e} by sampling, {:.1e} by the ODEs; {}",
-                    run_.options.formula.degree, run_.steps, largest(&WeakErrorSplit::discretisation),
-                    largest(&WeakErrorSplit::thinning), largest(&WeakErrorSplit::sampling),
-                    largest(&WeakErrorSplit::ode), reason),
-        "tolerance", fmt::format("{}", target_.tolerance));
-  }
-
-  ControlledResult finish() {
-    run_.richardson = true;
-    result_.run = run_;
-    result_.ode_solves = solves();
-    return std::move(result_);
+                    run_.options.formula.degree, steps_of_level(run_, run_.steps),
+                    largest(&WeakErrorSplit::discretisation), largest(&WeakErrorSplit::thinning),
+                    largest(&WeakErrorSplit::sampling), largest(&WeakErrorSplit::ode), reason)};
   }
 
   const Model& model_;
-  std::size_t count_, rungs_;
-  std::vector<BatchFunction> payoffs_;  ///< rung by rung
-  WeakRun run_;
+  std::size_t payoffs_a_rung_, rungs_, times_;
+  std::vector<WeakPayoff> payoffs_;  ///< rung by rung
+  WeakRun run_;                      ///< steps is the level of the grid
   const WeakTarget& target_;
-  bool random_, ode_tightened_ = false;
-  ControlledResult result_;
-  std::vector<double> ode_;  ///< at 2 steps, one for each of payoffs_
+  bool random_, by_width_, bounds_fail_ = false, ode_tightened_ = false;
+  ControlledResult result_, best_;  ///< of the trees now; what is returned
+  std::size_t rung_ = 0;
+  std::vector<double> ode_;  ///< at 2 steps, one for each value of a tree
   std::uint64_t pilot_solves_ = 0;
   std::size_t fewer_nodes_ = 1;
-  std::map<std::size_t, WeakLevels> levels_;  ///< by number of nodes
+  std::map<std::pair<std::size_t, double>, WeakLevels> levels_;  ///< by number of nodes and patch width
 };
 
 }  // namespace
@@ -280,7 +491,7 @@ double discretisation_estimate(std::span<const double> V, int degree) {
                    step * std::abs(1 / (rho - 1) - 1 / (gain - 1))});
 }
 
-ControlledResult weak_to_tolerance(const Model& model, const std::vector<std::vector<BatchFunction>>& rungs,
+ControlledResult weak_to_tolerance(const Model& model, const std::vector<std::vector<WeakPayoff>>& rungs,
                                    const WeakRun& run, const WeakTarget& target) {
   if (!(target.tolerance > 0) || !std::isfinite(target.tolerance))
     throw InputError("must be positive", "tolerance", fmt::format("{}", target.tolerance));

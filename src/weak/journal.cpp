@@ -5,7 +5,7 @@
 namespace wienertree {
 
 void exchange(StateArchive& archive, WeakEstimate& estimate) {
-  archive(estimate.value, estimate.leaves, estimate.ode_solves, estimate.discarded);
+  archive(estimate.value, estimate.carriers, estimate.leaves, estimate.ode_solves, estimate.discarded);
 }
 
 void WeakJournal::exchange(StateArchive& archive) {

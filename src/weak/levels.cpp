@@ -1,5 +1,6 @@
 #include "wienertree/weak/levels.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <utility>
 
@@ -7,7 +8,7 @@
 
 namespace wienertree {
 
-WeakLevels::WeakLevels(const Model& model, const std::vector<BatchFunction>& payoffs, WeakRun run)
+WeakLevels::WeakLevels(const Model& model, const std::vector<WeakPayoff>& payoffs, WeakRun run)
     : model_(model),
       payoffs_(payoffs),
       run_(std::move(run)),
@@ -17,7 +18,7 @@ const std::vector<WeakEstimate>& WeakLevels::trees(std::size_t n) {
   std::vector<WeakEstimate>& grown = trees_[n];
   if (grown.size() < launches_) {
     WeakOptions options = run_.options;
-    options.grid = time_grid(run_.grid, run_.horizon, n, run_.gamma);
+    set_grid(run_, n, options);
     while (grown.size() < launches_) {
       options.launch = static_cast<std::uint32_t>(grown.size());
       grown.push_back(weak_approximation(model_, start_, payoffs_, options));
@@ -44,7 +45,7 @@ double WeakLevels::extrapolated(std::size_t n, std::size_t payoff, std::size_t l
 
 std::vector<double> WeakLevels::extrapolated(std::size_t n) {
   // From the first one on, so that equal values have exactly their own as mean.
-  std::vector<double> mean(payoffs_.size());
+  std::vector<double> mean(trees(n).front().value.size());
   for (std::size_t i = 0; i < mean.size(); ++i) {
     const double first = mean[i] = extrapolated(n, i, 0);
     for (std::uint32_t m = 1; m < launches_; ++m) mean[i] += (extrapolated(n, i, m) - first) / launches_;
@@ -53,7 +54,7 @@ std::vector<double> WeakLevels::extrapolated(std::size_t n) {
 }
 
 std::vector<double> WeakLevels::standard_error(std::size_t n) {
-  std::vector<double> error(payoffs_.size(), 0.0);
+  std::vector<double> error(trees(n).front().value.size(), 0.0);
   if (launches_ == 1) return error;
   const std::vector<double> mean = extrapolated(n);
   for (std::size_t i = 0; i < error.size(); ++i) {
@@ -61,6 +62,11 @@ std::vector<double> WeakLevels::standard_error(std::size_t n) {
     error[i] = std::sqrt(error[i] / (launches_ - 1.0) / launches_);
   }
   return error;
+}
+
+std::size_t WeakLevels::carriers(std::size_t n) {
+  const std::vector<std::size_t>& each = trees(n).front().carriers;
+  return *std::min_element(each.begin(), each.end());
 }
 
 std::uint64_t WeakLevels::ode_solves(std::size_t n) {

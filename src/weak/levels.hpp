@@ -14,7 +14,7 @@ namespace wienertree {
 class WeakLevels {
  public:
   /// @param run its steps, launches and richardson have no meaning
-  WeakLevels(const Model& model, const std::vector<BatchFunction>& payoffs, WeakRun run);
+  WeakLevels(const Model& model, const std::vector<WeakPayoff>& payoffs, WeakRun run);
 
   /// Averages are over the launches 0..M-1 from now on.   @pre M >= 1
   void set_launches(std::uint32_t M) { launches_ = M; }
@@ -26,6 +26,8 @@ class WeakLevels {
   /// Of X_n, from the launches; 0 where there is one.
   std::vector<double> standard_error(std::size_t n);
 
+  /// The fewest leaves or families that carry a payoff with n steps.
+  std::size_t carriers(std::size_t n);
   std::size_t leaves(std::size_t n) { return trees(n).back().leaves; }
   /// Of all launches with n steps.
   std::uint64_t ode_solves(std::size_t n);
@@ -37,7 +39,7 @@ class WeakLevels {
   double extrapolated(std::size_t n, std::size_t payoff, std::size_t launch);
 
   const Model& model_;
-  const std::vector<BatchFunction>& payoffs_;
+  const std::vector<WeakPayoff>& payoffs_;
   WeakRun run_;
   Generation start_;
   std::uint32_t launches_ = 1;

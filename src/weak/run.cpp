@@ -1,7 +1,9 @@
 #include "wienertree/weak/run.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <string>
+#include <utility>
 
 #include "wienertree/tree/initial.hpp"
 
@@ -42,32 +44,91 @@ double extrapolate(double coarse, double fine, std::size_t k, std::size_t n, int
   return fine + (fine - coarse) / (std::pow(ratio, (degree - 1) / 2.0) - 1);
 }
 
-WeakResult run_weak(const Model& model, const std::vector<BatchFunction>& payoffs, const WeakRun& run) {
+namespace {
+
+// f_k of each interval.
+std::vector<double> shares(const std::vector<double>& horizons) {
+  std::vector<double> result;
+  double before = 0;
+  for (const double t : horizons)
+    result.push_back(std::exp2(std::round(std::log2((t - std::exchange(before, t)) / t))));
+  return result;
+}
+
+std::size_t steps_of_share(std::size_t m, double share) {
+  return std::max<std::size_t>(1, static_cast<std::size_t>(static_cast<double>(m) * share));
+}
+
+}  // namespace
+
+std::size_t steps_of_level(const WeakRun& run, std::size_t m) {
+  if (run.horizons.size() < 2) return m;
+  std::size_t sum = 0;
+  for (const double share : shares(run.horizons)) sum += steps_of_share(m, share);
+  return sum;
+}
+
+std::size_t level_of(const WeakRun& run) {
+  if (run.horizons.size() < 2) return run.steps;
+  double sum = 0;
+  for (const double share : shares(run.horizons)) sum += share;
+  const double m = static_cast<double>(run.steps) / sum;
+  // Extrapolation wants every interval to have twice the steps of the coarser tree: down to f_k = 1/4.
+  const double multiple = run.richardson ? 8 : 1;
+  return static_cast<std::size_t>(std::max(1.0, std::round(m / multiple)) * multiple);
+}
+
+void set_grid(const WeakRun& run, std::size_t m, WeakOptions& options) {
+  options.report_at.clear();
+  if (run.horizons.size() < 2) {
+    options.grid = time_grid(run.grid, run.horizon, m, run.gamma);
+    return;
+  }
+  for (std::size_t i = 0; i < run.horizons.size(); ++i)
+    if (!(run.horizons[i] > (i == 0 ? 0 : run.horizons[i - 1])) || !std::isfinite(run.horizons[i]))
+      throw InputError("times must be positive and ascend", "horizon", std::to_string(run.horizons[i]));
+  if (run.grid != GridKind::uniform)
+    throw InputError("has one time to shrink towards, not several", "grid", "kusuoka");
+  options.grid.assign(1, 0.0);
+  const std::vector<double> share = shares(run.horizons);
+  for (std::size_t k = 0; k < share.size(); ++k) {
+    const double from = k == 0 ? 0 : run.horizons[k - 1], length = run.horizons[k] - from;
+    const std::size_t n = steps_of_share(m, share[k]);
+    for (std::size_t i = 1; i < n; ++i)
+      options.grid.push_back(from + length * static_cast<double>(i) / static_cast<double>(n));
+    options.grid.push_back(run.horizons[k]);
+    options.report_at.push_back(options.grid.size() - 1);
+  }
+}
+
+WeakResult run_weak(const Model& model, const std::vector<WeakPayoff>& payoffs, const WeakRun& run) {
   if (run.launches == 0) throw InputError("must be at least 1", "launches", "0");
   if (run.richardson && run.steps < 2)
     throw InputError("extrapolation needs at least 2 steps", "richardson", std::to_string(run.steps));
   const Generation start = first_generation(model, run.options.nodes);
-  const std::size_t coarse_steps = (run.steps + 1) / 2;
-  std::vector<Mean> value(payoffs.size()), extrapolated(run.richardson ? payoffs.size() : 0);
+  const std::size_t level = level_of(run), coarse_level = (level + 1) / 2;
+  const std::size_t values = payoffs.size() * std::max<std::size_t>(1, run.horizons.size());
+  std::vector<Mean> value(values), extrapolated(run.richardson ? values : 0);
   WeakResult result;
   WeakOptions options = run.options;
   const auto tree = [&](std::size_t steps) {
-    options.grid = time_grid(run.grid, run.horizon, steps, run.gamma);
+    set_grid(run, steps, options);
     WeakEstimate estimate = weak_approximation(model, start, payoffs, options);
     result.ode_solves += estimate.ode_solves;
     return estimate;
   };
   for (std::uint32_t launch = 0; launch < run.launches; ++launch) {
     options.launch = run.first_launch + launch;
-    const WeakEstimate fine = tree(run.steps);
+    const WeakEstimate fine = tree(level);
     result.leaves = fine.leaves;
+    result.carriers = fine.carriers;
     result.discarded = fine.discarded;
-    for (std::size_t i = 0; i < payoffs.size(); ++i) value[i].add(fine.value[i]);
+    for (std::size_t i = 0; i < values; ++i) value[i].add(fine.value[i]);
     if (!run.richardson) continue;
-    const WeakEstimate coarse = tree(coarse_steps);
-    for (std::size_t i = 0; i < payoffs.size(); ++i)
+    const WeakEstimate coarse = tree(coarse_level);
+    for (std::size_t i = 0; i < values; ++i)
       extrapolated[i].add(
-          extrapolate(coarse.value[i], fine.value[i], coarse_steps, run.steps, options.formula.degree));
+          extrapolate(coarse.value[i], fine.value[i], coarse_level, level, options.formula.degree));
   }
   split(value, result.value, result.standard_error);
   split(extrapolated, result.extrapolated, result.extrapolated_standard_error);

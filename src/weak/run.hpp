@@ -11,27 +11,42 @@ namespace wienertree {
 struct WeakRun {
   WeakOptions options;  ///< grid and launch are filled in
   GridKind grid = GridKind::uniform;
-  double horizon = 1;                            ///< T
-  std::size_t steps = 10;                        ///< n
+  double horizon = 1;  ///< T
+  /// Several times to report at, ascending, the last one T; empty: T alone.
+  std::vector<double> horizons = {};
+  std::size_t steps = 10;                        ///< n to the last time; with several, about as many
   double gamma = 1;                              ///< of Kusuoka's grid
   std::uint32_t launches = 1, first_launch = 0;  ///< launches from first_launch on
   /// Also from ceil(n/2) steps, and the two extrapolated.
   bool richardson = false;
 };
 
-/// Per payoff. Standard errors are those of the average of the launches, 0 where nothing is random.
+/// Per payoff, time by time where there are several. Standard errors are those of the average of the
+/// launches, 0 where nothing is random.
 struct WeakResult {
   std::vector<double> value, standard_error;
   /// Empty unless asked for:  V_n + (V_n - V_k) / ((n/k)^q - 1),  k = ceil(n/2),  which takes the leading
   /// term C n^{-q}, q = (m-1)/2, from the error of degree m (Talay, Tubaro 1990; Kusuoka 2001).
   std::vector<double> extrapolated, extrapolated_standard_error;
-  std::size_t leaves = 0;        ///< of the last launch with n steps
-  std::uint64_t ode_solves = 0;  ///< of all trees
-  double discarded = 0;          ///< of the tree with n steps: see WeakEstimate
+  std::vector<std::size_t> carriers;  ///< see WeakEstimate
+  std::size_t leaves = 0;             ///< of the last launch with n steps
+  std::uint64_t ode_solves = 0;       ///< of all trees
+  double discarded = 0;               ///< of the tree with n steps: see WeakEstimate
 };
 
 /// @throws InputError as weak_approximation; if launches or n are 0, or n < 2 with richardson
-WeakResult run_weak(const Model& model, const std::vector<BatchFunction>& payoffs, const WeakRun& run);
+WeakResult run_weak(const Model& model, const std::vector<WeakPayoff>& payoffs, const WeakRun& run);
+
+/// Level m of the grid: with one time m steps. With several, m steps to the first, and m f_k, at least 1, in the
+/// k-th interval, f_k the power of 2 next to (T_k - T_{k-1}) / T_k: what a step must be short against is the
+/// time at which it is looked at. All steps together.
+std::size_t steps_of_level(const WeakRun& run, std::size_t m);
+
+/// The level with about run.steps steps, >= 1.
+std::size_t level_of(const WeakRun& run);
+
+/// Fills in the grid of level m and the steps to report at.
+void set_grid(const WeakRun& run, std::size_t m, WeakOptions& options);
 
 /// Whether the seed changes the result.
 bool is_random(const WeakOptions& options);

@@ -12,7 +12,7 @@ std::size_t Slabs::number(std::size_t dimension, std::size_t budget) {
 }
 
 void Slabs::thin(const Generation& sites, const std::vector<double>& value, std::size_t budget,
-                 const RandomStream& random, Thinning& thinning, Selection& out) {
+                 const RandomStream& random, Thinning& thinning, Selection& out, ConstBatchView deviation) {
   const std::size_t total = sites.size(), d = sites.states.components();
   order_.resize(total);
   std::iota(order_.begin(), order_.end(), 0U);
@@ -39,7 +39,14 @@ void Slabs::thin(const Generation& sites, const std::vector<double>& value, std:
       weight_[n - first] = sites.log_weight[order_[n]];
       for (std::size_t i = 0; i < d; ++i) states_(i, n - first) = sites.states(i, order_[n]);
     }
-    thinning.thin({states_, weight_, 0}, budget / slabs, random, part_);
+    Sites part{states_, weight_};
+    if (deviation.nodes() == total) {
+      deviation_.reshape(d, last - first);
+      for (std::size_t n = first; n < last; ++n)
+        for (std::size_t i = 0; i < d; ++i) deviation_(i, n - first) = deviation(i, order_[n]);
+      part.deviation = deviation_;
+    }
+    thinning.thin(part, budget / slabs, random, part_);
     for (std::size_t m = 0; m < part_.site.size(); ++m) out.site.push_back(order_[first + part_.site[m]]);
     out.log_weight.insert(out.log_weight.end(), part_.log_weight.begin(), part_.log_weight.end());
     out.discarded += part_.discarded;

@@ -8,8 +8,8 @@
 #include <cstdint>
 #include <vector>
 
-#include "wienertree/tree/generation.hpp"
 #include "wienertree/thinning/thinning.hpp"
+#include "wienertree/tree/generation.hpp"
 
 namespace wienertree {
 
@@ -23,13 +23,14 @@ class Slabs {
 
   /// @param value one a site, the direction
   /// @param budget N >= 1, shared by the slabs
+  /// @param deviation see Sites; may be empty
   void thin(const Generation& sites, const std::vector<double>& value, std::size_t budget,
-            const RandomStream& random, Thinning& thinning, Selection& out);
+            const RandomStream& random, Thinning& thinning, Selection& out, ConstBatchView deviation = {});
 
  private:
   std::vector<std::uint32_t> order_;
   std::vector<double> weight_;
-  Batch states_;
+  Batch states_, deviation_;
   Selection part_;
 };
 

@@ -9,30 +9,21 @@
 #include "wienertree/thinning/recombination/recombination.hpp"
 #include "wienertree/tree/growth.hpp"
 #include "wienertree/tree/tree_size.hpp"
+#include "wienertree/weak/families.hpp"
 #include "wienertree/weak/journal.hpp"
 #include "wienertree/weak/slabs.hpp"
 
 namespace wienertree {
 namespace {
 
-// The weighted sum of a payoff over the leaves, Neumaier-compensated: with 10^7 leaves a plain sum would lose
-// three digits.
-double average(const BatchFunction& payoff, const Generation& leaves, std::vector<double>& values) {
-  values.resize(leaves.size());
-  payoff(leaves.states, values);
-  double sum = 0, lost = 0;
-  for (std::size_t n = 0; n < leaves.size(); ++n) {
-    const double term = std::exp(leaves.log_weight[n]) * values[n], next = sum + term;
-    lost += std::abs(sum) >= std::abs(term) ? (sum - next) + term : (term - next) + sum;
-    sum = next;
-  }
-  return sum + lost;
-}
+// As many children are never thinned by width.
+constexpr std::size_t few = 32;
 
 class WeakTree {
  public:
-  WeakTree(const Model& model, const WeakOptions& options)
+  WeakTree(const Model& model, const std::vector<WeakPayoff>& payoffs, const WeakOptions& options)
       : model_(model),
+        payoffs_(payoffs),
         options_(options),
         pruned_(options.thinning.method != ThinningMethod::none),
         by_weight_alone_(pruned_ && options.thinning.order == SiteOrder::tree &&
@@ -45,11 +36,18 @@ class WeakTree {
     directed_ =
         options.finest_along && dimensions > 1 && options.thinning.method == ThinningMethod::recombination;
     if (directed_) drift_flow_ = make_flow(options.flow, model, {1e-4, 1e-6}, 3);
+    by_width_ = options.thinning.method == ThinningMethod::recombination;
+    on_a_line_ = by_width_ && options.patch_width > 0 && dimensions == 1;
+    for (const WeakPayoff& payoff : payoffs) kinks_ = kinks_ || !payoff.function.kinks.empty();
+    two_steps_ = kinks_ && options.formula.degree <= 5 && options.formula.paths.size() <= 16;
     drift_increments_.assign(1 + model.noise_dimension(), 0.0);
     for (const CubaturePath& path : options.formula.paths) log_lambda_.push_back(std::log(path.weight));
   }
 
-  void plant(const Generation& start) { copy_generation(start, nodes_); }
+  void plant(const Generation& start) {
+    copy_generation(start, nodes_);
+    if (model_.has_clock) clock_ = nodes_.states(model_.state_dimension() - 1, 0) - options_.grid.front();
+  }
 
   void grow() {
     const std::size_t steps = options_.grid.size() - 1;
@@ -57,35 +55,30 @@ class WeakTree {
       const std::size_t j = steps_done_ + 1;
       const RandomStream random{options_.seed, options_.launch, static_cast<std::uint32_t>(j),
                                 Purpose::path_sampling};
-      const bool keeps_all = !pruned_ || nodes_.size() * options_.formula.paths.size() <= options_.nodes;
-      if (by_weight_alone_ && !keeps_all)
-        step_by_weight(j, random);
-      else
-        step(j, random, keeps_all || j == steps);
+      const std::size_t children = nodes_.size() * options_.formula.paths.size();
+      const bool keeps_all = !pruned_ || children <= (on_a_line_ ? few : options_.nodes);
+      // The last step need not be made where its leaves were averaged over with the step before.
+      if (estimate_.value.size() < expected_values()) {
+        if (by_weight_alone_ && !keeps_all && !(kinks_ && reports(j)))
+          step_by_weight(j, random);
+        else
+          step(j, random, keeps_all || j == steps);
+      }
       steps_done_ = j;
       if (options_.observe) options_.observe(j);
     }
   }
 
-  WeakEstimate average_over_leaves(const std::vector<BatchFunction>& payoffs) const {
-    WeakEstimate estimate;
-    estimate.leaves = nodes_.size();
-    estimate.ode_solves = solves();
-    estimate.discarded = discarded_;
-    std::vector<double> values;
-    for (const BatchFunction& payoff : payoffs) {
-      estimate.value.push_back(average(payoff, nodes_, values));
-      if (!std::isfinite(estimate.value.back()))
-        throw RunError(
-            fmt::format("the average of payoff {} over the leaves is not finite", estimate.value.size()),
-            "payoff", fmt::format("{}", estimate.value.back()));
-    }
-    return estimate;
+  WeakEstimate estimate() const {
+    WeakEstimate result = estimate_;
+    result.ode_solves = solves();
+    result.discarded = discarded_;
+    return result;
   }
 
   void exchange(StateArchive& archive) {
     std::uint64_t solved = solves();
-    archive(steps_done_, nodes_, discarded_, solved);
+    archive(steps_done_, nodes_, discarded_, solved, estimate_.value, estimate_.carriers, estimate_.leaves);
     if (!archive.reading()) return;
     StateArchive::require(steps_done_ < options_.grid.size() && nodes_.size() > 0 &&
                           nodes_.states.components() == model_.state_dimension() &&
@@ -97,10 +90,59 @@ class WeakTree {
   std::uint64_t solves() const { return solves_before_ + grower_.statistics().node_segments; }
   double length(std::size_t j) const { return options_.grid[j] - options_.grid[j - 1]; }
 
-  void discount(Generation& nodes) const {
+  std::size_t expected_values() const {
+    return payoffs_.size() * std::max<std::size_t>(1, options_.report_at.size());
+  }
+  bool reports(std::size_t j) const {
+    if (options_.report_at.empty()) return j + 1 == options_.grid.size();
+    return std::binary_search(options_.report_at.begin(), options_.report_at.end(), j);
+  }
+
+  // Averages over leaves at the end of step j, in families of the nodes `parents` of one generation.
+  void report(std::size_t j, const Generation& leaves, std::size_t parents) {
+    estimate_.leaves = leaves.size();
+    std::optional<FamilyAverage> families;
+    for (std::size_t i = 0; i < payoffs_.size(); ++i) {
+      const KinkedFunction& f = payoffs_[i].function;
+      LeafAverage average;
+      if (f.kinks.empty() || parents == 0) {
+        average = average_over(f.exact, leaves);
+      } else {
+        if (!families) families.emplace(leaves, parents, options_.formula.degree >= 7);
+        average = (*families)(f);
+      }
+      estimate_.value.push_back(average.value * std::exp(-payoffs_[i].discount_rate * options_.grid[j]));
+      estimate_.carriers.push_back(average.carriers);
+      if (!std::isfinite(estimate_.value.back()))
+        throw RunError(fmt::format("the average of payoff {} over the leaves is not finite", i + 1), "payoff",
+                       fmt::format("{}", estimate_.value.back()));
+    }
+  }
+
+  // What is the same for all nodes at a time must not come to differ by rounding.
+  void settle(Generation& nodes, std::size_t j) const {
+    if (model_.has_clock) {
+      const auto clock = nodes.states.component(model_.state_dimension() - 1);
+      std::fill(clock.begin(), clock.end(), clock_ + options_.grid[j]);
+    }
     if (!options_.discount_state) return;
     const auto x = nodes.states.component(*options_.discount_state);
     for (std::size_t n = 0; n < nodes.size(); ++n) nodes.log_weight[n] -= std::exchange(x[n], 0.0);
+  }
+
+  // The standard deviation of each component over the next step, by the diffusion at each child.
+  void find_deviations(std::size_t j) {
+    const std::size_t d = model_.state_dimension(), p = model_.noise_dimension(), sites = children_.size();
+    diffusion_.reshape(d * p, sites);
+    deviation_.reshape(d, sites);
+    model_.fields->diffusion(children_.states, diffusion_);
+    const double root = std::sqrt(length(std::min(j + 1, options_.grid.size() - 1)));
+    for (std::size_t i = 0; i < d; ++i)
+      for (std::size_t n = 0; n < sites; ++n) {
+        double square = 0;
+        for (std::size_t k = 0; k < p; ++k) square += diffusion_(i * p + k, n) * diffusion_(i * p + k, n);
+        deviation_(i, n) = root * std::sqrt(square);
+      }
   }
 
   void require_success(std::size_t j) const {
@@ -111,17 +153,29 @@ class WeakTree {
   void step(std::size_t j, const RandomStream& random, bool keep_all) {
     grower_.grow(nodes_, length(j), children_, failures_);
     require_success(j);
-    discount(children_);
+    settle(children_, j);
+    const std::size_t parents = nodes_.size();
+    if (reports(j) && !(two_steps_ && j > 1)) report(j, children_, parents);
+    if (two_steps_ && j + 1 < options_.grid.size() && reports(j + 1)) {
+      grower_.grow(children_, length(j + 1), grandchildren_, failures_);
+      require_success(j + 1);
+      settle(grandchildren_, j + 1);
+      report(j + 1, grandchildren_, parents);
+    }
     if (keep_all) {
       std::swap(nodes_, children_);
       return;
     }
+    if (by_width_) find_deviations(j);
     if (directed_) {
       look_ahead(options_.grid.back() - options_.grid[j]);
-      slabs_.thin(children_, value_, options_.nodes, random, *thinning_, selection_);
+      slabs_.thin(children_, value_, options_.nodes, random, *thinning_, selection_,
+                  by_width_ ? ConstBatchView(deviation_) : ConstBatchView());
     } else {
-      thinning_->thin({children_.states, children_.log_weight, nodes_.size(), &grower_.threads()},
-                      options_.nodes, random, selection_);
+      Sites sites{children_.states, children_.log_weight, parents, &grower_.threads()};
+      if (by_width_) sites.deviation = deviation_;
+      sites.width = options_.patch_width;
+      thinning_->thin(sites, options_.nodes, random, selection_);
     }
     select(children_, selection_, nodes_, &grower_.threads());
     discarded_ += selection_.discarded;
@@ -154,17 +208,26 @@ class WeakTree {
                     selection_);
     grower_.grow_chosen(nodes_, length(j), selection_, children_, failures_);
     require_success(j);
-    discount(children_);
+    settle(children_, j);
+    if (reports(j)) report(j, children_, 0);
     std::swap(nodes_, children_);
   }
 
   const Model& model_;
+  const std::vector<WeakPayoff>& payoffs_;
   const WeakOptions& options_;
   bool pruned_, by_weight_alone_;
+  bool kinks_ = false;      ///< some payoff has them
+  bool two_steps_ = false;  ///< families are those of the last two steps
+  bool on_a_line_ = false;  ///< patches have a given width, whatever the budget
+  bool by_width_ = false;   ///< thinning looks at local standard deviations
+  double clock_ = 0;        ///< at t = 0
+  WeakEstimate estimate_;
   std::unique_ptr<Thinning> thinning_;
   TreeGrower grower_;
   std::vector<double> log_lambda_, site_weight_;
-  Generation nodes_, children_;
+  Generation nodes_, children_, grandchildren_;
+  Batch diffusion_, deviation_;
   Selection selection_;
   bool directed_;
   std::unique_ptr<Flow> drift_flow_;
@@ -180,7 +243,7 @@ class WeakTree {
 }  // namespace
 
 WeakEstimate weak_approximation(const Model& model, const Generation& start,
-                                const std::vector<BatchFunction>& payoffs, const WeakOptions& options) {
+                                const std::vector<WeakPayoff>& payoffs, const WeakOptions& options) {
   check(model);
   check_formula_fits(options.formula, model);
   if (options.grid.size() < 2)
@@ -198,14 +261,15 @@ WeakEstimate weak_approximation(const Model& model, const Generation& start,
     require_memory(levelwise_bytes(model.state_dimension(), options.nodes), options.memory_limit,
                    fmt::format("thinning by one patch of {} nodes", options.nodes), "--nodes");
   if (const WeakEstimate* known = options.journal ? options.journal->next() : nullptr) {
-    StateArchive::require(known->value.size() == payoffs.size());
+    StateArchive::require(known->value.size() ==
+                          payoffs.size() * std::max<std::size_t>(1, options.report_at.size()));
     return *known;
   }
-  WeakTree tree(model, options);
+  WeakTree tree(model, payoffs, options);
   tree.plant(start);
   WeakJournal::Growing growing(options.journal, [&tree](StateArchive& archive) { tree.exchange(archive); });
   tree.grow();
-  const WeakEstimate estimate = tree.average_over_leaves(payoffs);
+  const WeakEstimate estimate = tree.estimate();
   growing.done(estimate);
   return estimate;
 }

@@ -3,6 +3,7 @@
 /// not, and the payoffs averaged over its leaves (Kusuoka 2001; Lyons, Victoir 2004; Litterer, Lyons 2012 for
 /// the thinned tree; Ninomiya 2003, "A partial sampling method applied to the Kusuoka approximation", for the
 /// tree sampled by TBBA).
+#include <concepts>
 #include <cstdint>
 #include <functional>
 #include <optional>
@@ -21,11 +22,27 @@ namespace wienertree {
 
 class WeakJournal;
 
+/// What is averaged. With kinks it is averaged family by family (families.hpp), else leaf by leaf.
+struct WeakPayoff {
+  KinkedFunction function;
+  double discount_rate = 0;  ///< values are multiplied by exp(-discount_rate t)
+
+  template <class F>
+  requires std::constructible_from<BatchFunction, F> WeakPayoff(F smooth)
+      : function{BatchFunction(std::move(smooth)), {}, {}, {}, {}, {}} {}
+  explicit WeakPayoff(KinkedFunction kinked) : function(std::move(kinked)) {}
+};
+
 struct WeakOptions {
   CubatureFormula formula;   ///< dimension p of the model
   std::vector<double> grid;  ///< from time_grid
   std::size_t nodes = 1000;  ///< N, the budget of the thinning; `none` has no use for it
   ThinningOptions thinning = {ThinningMethod::recombination, SiteOrder::spatial, 0};
+  /// Width of the patches of a recombination in units of the local one-step standard deviation, where one
+  /// component varies; as few as fit into N nodes where that is less. 0: as many as fit.
+  double patch_width = 0;
+  /// Steps after which the payoffs are averaged, ascending; empty: after the last.
+  std::vector<std::size_t> report_at = {};
   /// What the payoffs bend along, the argument of a kink, say; may be empty. In two dimensions and more
   /// recombination is then finest along its value at T on the path without noise (slabs.hpp).
   BatchFunction finest_along = {};
@@ -46,7 +63,10 @@ struct WeakOptions {
 };
 
 struct WeakEstimate {
-  std::vector<double> value;     ///< one for each payoff
+  std::vector<double> value;  ///< one for each payoff, time by time where there are several
+  /// Leaves, or families of leaves, that carry 99 % of the average of each payoff's modulus; at most 64
+  /// are counted.
+  std::vector<std::size_t> carriers;
   std::size_t leaves = 0;        ///< nodes at T that the values are averaged over
   std::uint64_t ode_solves = 0;  ///< node-segments moved
   double discarded = 0;          ///< sum over the steps of Selection::discarded
@@ -59,12 +79,14 @@ void exchange(StateArchive& archive, WeakEstimate& estimate);
 /// While a step has at most N children they are all kept. Beyond that, a random thinning in tree order looks
 /// at weights alone: it chooses among the children before any is moved, so that a step costs N moves. All
 /// others look at states: a step costs N c moves, c the paths of the formula, and the children of the last
-/// step are averaged over as they are.
+/// step are averaged over as they are. Where a payoff has kinks, all children of the last step are moved, and
+/// for a formula of degree 5 or less, with at most 16 paths, those of the last two.
+/// A clock is the same for all nodes: it is set, not integrated, and is no dimension to be thinned in.
 /// @param payoffs functions of the d states, each with one value a node
 /// @throws InputError if an option does not fit the model, or the tree exceeds the memory limit, with its
 /// size and the options that avoid it; RunError naming step, time, node and state when a node cannot be
 /// moved, and naming the payoff when its average is not finite
 WeakEstimate weak_approximation(const Model& model, const Generation& start,
-                                const std::vector<BatchFunction>& payoffs, const WeakOptions& options);
+                                const std::vector<WeakPayoff>& payoffs, const WeakOptions& options);
 
 }  // namespace wienertree

@@ -140,7 +140,7 @@ double check_value(const std::string& name, double tolerance, double margin) {
 }
 
 BatchFunction with_smooth_kink(const TextModel& text, const KinkedFunction& f) {
-  return smooth_payoffs({f}, kink_deviations(text.model(), {f}, 1, {}), 0.4)[0];
+  return smooth_payoff(f, kink_scales(text.model(), {f}, 1, {})[0], 0.4);
 }
 
 }  // namespace
@@ -165,7 +165,7 @@ TEST_CASE("Heston's Asian call to 1e-5") {
   fmt::print("  {:.2f} s of processor time\n", check_value(asian.name, 1e-5, 1e-5));
   const TextModel& text = asian.model;
   const KinkedFunction f = text.compile_kinked(asian.payoff, "payoff");
-  const std::vector<BatchFunction> smooth = {with_smooth_kink(text, f)};
+  const std::vector<WeakPayoff> smooth = {with_smooth_kink(text, f)};
   fmt::print("error of the Asian call against n, 800 nodes\n");
   for (const int degree : {5, 7, 9}) {
     fmt::print("  degree {}:", degree);

@@ -110,10 +110,19 @@ inline wienertree::ControlledResult to_tolerance(
   run.options.discount_state = problem.discount_state;
   run.horizon = problem.horizon;
   if (!f[0].kinks.empty()) run.options.finest_along = f[0].kinks.front();
-  const auto deviations = kink_deviations(model, f, problem.horizon, problem.discount_state);
-  std::vector<std::vector<BatchFunction>> rungs;
-  for (int k = 0; k < (f[0].kinks.empty() ? 1 : 10); ++k)
-    rungs.push_back(smooth_payoffs(f, deviations, 0.4 * std::exp2(-k / 4.0)));
+  for (const CubatureFormula& formula : target.formulas) target.guards.push_back(formula);
+  if (target.formulas.size() > 2) target.formulas.pop_back();
+  if (d == 1 && thin == ThinningMethod::recombination) {
+    run.options.patch_width = 2;
+    run.options.nodes = 100000;
+  }
+  const auto scales = kink_scales(model, f, problem.horizon, problem.discount_state);
+  std::vector<std::vector<WeakPayoff>> rungs;
+  if (last_step_smooths(scales[0]))
+    rungs.push_back({WeakPayoff(f[0])});
+  else
+    for (int k = 0; k < 10; ++k)
+      rungs.push_back({WeakPayoff(smooth_payoff(f[0], scales[0], 0.4 * std::exp2(-k / 4.0)))});
   return weak_to_tolerance(model, rungs, run, target);
 }
 

@@ -6,10 +6,10 @@
 #include "numeric/statistics.hpp"
 #include "wienertree/cubature/construct.hpp"
 #include "wienertree/model/cpp_model.hpp"
-#include "wienertree/weak/slabs.hpp"
 #include "wienertree/weak/control.hpp"
 #include "wienertree/weak/journal.hpp"
 #include "wienertree/weak/levels.hpp"
+#include "wienertree/weak/slabs.hpp"
 
 using namespace wienertree;
 
@@ -270,7 +270,7 @@ TEST_CASE("levels are the trees of a run, launch by launch") {
   run.launches = 6;
   run.richardson = true;
   run.steps = 8;
-  const std::vector<BatchFunction> payoffs = {smooth_payoff(), component(1)};
+  const std::vector<WeakPayoff> payoffs = {smooth_payoff(), component(1)};
   const WeakResult result = run_weak(model, payoffs, run);
   WeakLevels levels(model, payoffs, run);
   levels.set_launches(2);
@@ -293,10 +293,10 @@ TEST_CASE("the error of thinning is told where only the finest tree is thinned")
   target.tolerance = 1;
   target.formulas = {run.options.formula};
   target.choose_nodes = false;
-  const ControlledResult result = weak_to_tolerance(model, {{smooth_payoff()}}, run, target);
+  const ControlledResult result = weak_to_tolerance(model, {{WeakPayoff(smooth_payoff())}}, run, target);
   CHECK(result.run.steps == 4);
   run.options.thinning.method = ThinningMethod::none;
-  const double whole = weak_to_tolerance(model, {{smooth_payoff()}}, run, target).value[0];
+  const double whole = weak_to_tolerance(model, {{WeakPayoff(smooth_payoff())}}, run, target).value[0];
   CHECK(result.error[0].thinning > 0);
   CHECK(std::abs(result.value[0] - whole) <= result.error[0].thinning);
 }
@@ -304,7 +304,7 @@ TEST_CASE("the error of thinning is told where only the finest tree is thinned")
 TEST_CASE("what cannot be run is refused with the reason") {
   const Model model = bent();
   WeakRun run = run_of(ThinningMethod::none, {}, 1);
-  const std::vector<BatchFunction> payoffs = {component(0)};
+  const std::vector<WeakPayoff> payoffs = {component(0)};
   run.steps = 40;
   CHECK_THROWS_WITH(run_weak(model, payoffs, run),
                     Catch::Contains("11^40") && Catch::Contains("--thin recombination --nodes"));

@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <numbers>
+#include <span>
 #include <unordered_map>
 
 namespace wienertree::text {
@@ -62,6 +63,9 @@ class Smoothing {
     }
     if (e->op == Op::absolute)
       return arena_.sum({times(2, ramp(e->operands[0], operands[0])), times(-1, operands[0])});
+    if (e->op == Op::step) return jump(e->operands[0], operands[0]);
+    if (e->op == Op::sign)
+      return arena_.sum({times(2, jump(e->operands[0], operands[0])), arena_.number(-1)});
     if (e->op != Op::maximum && e->op != Op::minimum) return arena_.function(e->op, std::move(operands));
     const Expression exact = minus(e->operands[0], e->operands[1]), u = minus(operands[0], operands[1]);
     return e->op == Op::maximum ? arena_.sum({operands[1], ramp(exact, u)})
@@ -71,23 +75,50 @@ class Smoothing {
   Expression times(double c, Expression e) { return arena_.product({arena_.number(c), e}); }
   Expression minus(Expression a, Expression b) { return arena_.sum({a, times(-1, b)}); }
 
-  // f_h(u); `exact` is u with its own kinks unsmoothed.
-  Expression ramp(Expression exact, Expression u) {
+  struct Kernel {
+    Expression inverse_width, z, square, Phi, phi;
+  };
+  // `exact` is u with its own kinks unsmoothed.
+  Kernel kernel(Expression exact, Expression u) {
     const auto known = std::find(arguments_.begin(), arguments_.end(), exact);
     const auto k = static_cast<std::size_t>(known - arguments_.begin());
     if (known == arguments_.end()) arguments_.push_back(exact);
     const Expression inverse_width = arena_.symbol(Role::observation, k, "inverse_width");
     const Expression z = arena_.product({u, inverse_width}), square = arena_.power(z, arena_.number(2));
-    const Expression Phi =
-        times(0.5, arena_.function(Op::error_function_complement, {times(-1 / std::numbers::sqrt2, z)}));
-    const Expression phi = times(std::numbers::inv_sqrtpi / std::numbers::sqrt2,
-                                 arena_.function(Op::exponential, {times(-0.5, square)}));
-    static const auto coefficients = polynomial();
+    return {inverse_width, z, square,
+            times(0.5, arena_.function(Op::error_function_complement, {times(-1 / std::numbers::sqrt2, z)})),
+            times(std::numbers::inv_sqrtpi / std::numbers::sqrt2,
+                  arena_.function(Op::exponential, {times(-0.5, square)}))};
+  }
+
+  Expression polynomial_in(Expression square, std::span<const double> coefficients) {
     Expression P = arena_.number(coefficients.back());
     for (std::size_t i = coefficients.size() - 1; i-- > 0;)
       P = arena_.sum({arena_.number(coefficients[i]), arena_.product({square, P})});
-    const Expression width = arena_.power(inverse_width, arena_.number(-1));
-    return arena_.product({width, arena_.sum({arena_.product({z, Phi}), arena_.product({phi, P})})});
+    return P;
+  }
+
+  // f_h(u)
+  Expression ramp(Expression exact, Expression u) {
+    const Kernel K = kernel(exact, u);
+    static const auto coefficients = polynomial();
+    const Expression width = arena_.power(K.inverse_width, arena_.number(-1));
+    return arena_.product(
+        {width, arena_.sum({arena_.product({K.z, K.Phi}),
+                            arena_.product({K.phi, polynomial_in(K.square, coefficients)})})});
+  }
+
+  // f_h'(u) = Phi + phi (z (1 - P) + P')
+  Expression jump(Expression exact, Expression u) {
+    const Kernel K = kernel(exact, u);
+    static const auto coefficients = [] {
+      const auto P = polynomial();
+      auto Q = P;  // z Q(z^2) = z (1 - P) + P'
+      for (std::size_t i = 0; i < P.size(); ++i)
+        Q[i] = (i == 0 ? 1 : 0) - P[i] + (i + 1 < P.size() ? 2 * static_cast<double>(i + 1) * P[i + 1] : 0);
+      return Q;
+    }();
+    return arena_.sum({K.Phi, arena_.product({K.phi, K.z, polynomial_in(K.square, coefficients)})});
   }
 
   Arena& arena_;

@@ -30,7 +30,8 @@ struct SmoothedKinks {
   std::vector<Expression> arguments;  ///< u of every kink, without smoothing; equal ones once
 };
 
-/// Jumps (sign, comparisons, if) stay as they are. @pre no parameter or observation occurs in `e`
+/// A jump step(u), which is 1 for u > 0, becomes f_h'(u) = Phi(z) + phi(z) (z (1 - P(z)) + P'(z)), and
+/// sign(u) = 2 step(u) - 1. @pre no parameter or observation occurs in `e`
 SmoothedKinks smooth_kinks(Expression e, Arena& arena);
 
 }  // namespace wienertree::text

@@ -97,25 +97,78 @@ void cut_line(std::span<const double> x, std::span<const double> cumulative, Lin
   begin.push_back(x.size());
 }
 
-void LineRecombination::reduce(std::span<const double> x, std::span<const double> log_weight, int degree,
-                               std::size_t budget, LineNodes& out) {
+void cut_evenly(std::span<const double> xi, std::span<const double> cumulative, double width,
+                std::size_t most, std::vector<std::size_t>& begin) {
+  const std::size_t n = xi.size();
+  begin.assign(1, 0);
+  const double negligible = 1e-20 * cumulative.back();
+  std::size_t first = 0, last = n - 1;
+  while (first < last && cumulative[first + 1] <= negligible) ++first;
+  // From the right, where differences of sums would be rounding, by the weights.
+  for (double beyond = 0; last > first; --last) {
+    beyond += cumulative[last + 1] - cumulative[last];
+    if (beyond > negligible) break;
+  }
+  const double extent = xi[last] - xi[first];
+  const double fewest = extent / static_cast<double>(most);
+  const double actual = std::max(width, fewest);
+  if (extent > 0 && most > 1) {
+    const auto patches = static_cast<std::size_t>(std::clamp(std::ceil(extent / actual), 1.0, 1e9));
+    std::size_t at = first;
+    for (std::size_t k = 1; k < std::min(patches, most); ++k) {
+      const double end = xi[first] + extent * static_cast<double>(k) / static_cast<double>(patches);
+      while (at < last && xi[at] < end) ++at;
+      if (at > begin.back()) begin.push_back(at);
+    }
+  }
+  begin.push_back(n);
+}
+
+void LineRecombination::prepare(std::span<const double> x, std::span<const double> log_weight,
+                                LineNodes& out) {
   const std::size_t n = x.size();
-  const LineRule rule = line_rule(degree, budget);
   weight_.resize(n);
   relative_weights(log_weight, *std::max_element(log_weight.begin(), log_weight.end()), weight_.data());
   cumulative_.resize(n + 1);
   cumulative_[0] = 0;
   for (std::size_t i = 0; i < n; ++i) cumulative_[i + 1] = cumulative_[i] + weight_[i];
   deviation_ = mean_deviation(x.data(), weight_.data(), n).deviation;
-  cut_line(x, cumulative_, rule, begin_);
   out.x.clear();
   out.log_weight.clear();
   out.near.clear();
   out.discarded = 0;
+}
+
+void LineRecombination::reduce_patches(std::span<const double> x, std::span<const double> log_weight,
+                                       std::size_t nodes, LineNodes& out) {
   for (std::size_t k = 0; k + 1 < begin_.size(); ++k) {
     const std::size_t first = begin_[k], size = begin_[k + 1] - first;
-    reduce_patch(x.subspan(first, size), log_weight.subspan(first, size), first, rule.nodes, out);
+    reduce_patch(x.subspan(first, size), log_weight.subspan(first, size), first, nodes, out);
   }
+}
+
+void LineRecombination::reduce(std::span<const double> x, std::span<const double> log_weight, int degree,
+                               std::size_t budget, LineNodes& out) {
+  const LineRule rule = line_rule(degree, budget);
+  prepare(x, log_weight, out);
+  cut_line(x, cumulative_, rule, begin_);
+  reduce_patches(x, log_weight, rule.nodes, out);
+}
+
+void LineRecombination::reduce_evenly(std::span<const double> x, std::span<const double> log_weight,
+                                      std::span<const double> deviation, double width, int degree,
+                                      std::size_t budget, LineNodes& out) {
+  prepare(x, log_weight, out);
+  // The deviation varies slowly over a gap between points: its mean at the ends is as good as an integral.
+  xi_.resize(x.size());
+  xi_[0] = 0;
+  for (std::size_t i = 1; i < x.size(); ++i) {
+    const double between = 0.5 * (deviation[i] + deviation[i - 1]);
+    xi_[i] = xi_[i - 1] + (between > 0 ? (x[i] - x[i - 1]) / between : 0);
+  }
+  const std::size_t nodes = std::min(degree > 0 ? static_cast<std::size_t>(degree) / 2 + 1 : 4, budget);
+  cut_evenly(xi_, cumulative_, width, budget / nodes, begin_);
+  reduce_patches(x, log_weight, nodes, out);
 }
 
 void LineRecombination::reduce_patch(std::span<const double> x, std::span<const double> log_weight,

@@ -29,6 +29,14 @@ LineRule line_rule(int degree, std::size_t budget);
 void cut_line(std::span<const double> x, std::span<const double> cumulative, LineRule rule,
               std::vector<std::size_t>& begin);
 
+/// Patches of equal width on the scale  xi(x) = integral of dx / deviation(x), no more than `most`, over the
+/// part of the line that all but 1e-20 of the mass lies in on either side; what is beyond belongs to the first
+/// and the last. On a lattice of local standard deviations the smooth functions that a diffusion makes of any
+/// payoff vary alike everywhere, and the tails of a lognormal law are cut as finely as its middle.
+/// @param xi at the points, ascending
+void cut_evenly(std::span<const double> xi, std::span<const double> cumulative, double width,
+                std::size_t most, std::vector<std::size_t>& begin);
+
 struct LineNodes {
   std::vector<double> x;            ///< ascending
   std::vector<double> log_weight;   ///< one per node
@@ -41,14 +49,22 @@ class LineRecombination {
   /// @param x ascending, log_weight > -infinity, of the same length > budget
   void reduce(std::span<const double> x, std::span<const double> log_weight, int degree, std::size_t budget,
               LineNodes& out);
+  /// In patches cut evenly, of [r/2] + 1 nodes each (r = 0: 4).
+  /// @param deviation of each point, >= 0 and not all 0
+  void reduce_evenly(std::span<const double> x, std::span<const double> log_weight,
+                     std::span<const double> deviation, double width, int degree, std::size_t budget,
+                     LineNodes& out);
 
  private:
+  void prepare(std::span<const double> x, std::span<const double> log_weight, LineNodes& out);
+  void reduce_patches(std::span<const double> x, std::span<const double> log_weight, std::size_t nodes,
+                      LineNodes& out);
   void reduce_patch(std::span<const double> x, std::span<const double> log_weight, std::size_t first,
                     std::size_t nodes, LineNodes& out);
 
   DiscreteGauss gauss_;
   double deviation_ = 0;
-  std::vector<double> cumulative_, z_, weight_;
+  std::vector<double> cumulative_, xi_, z_, weight_;
   std::vector<std::size_t> begin_;
 };
 

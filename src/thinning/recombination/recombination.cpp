@@ -3,9 +3,11 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <bit>
 #include <cmath>
 #include <limits>
+#include <numeric>
 
 #include "wienertree/numeric/error.hpp"
 #include "wienertree/numeric/prefix_sort.hpp"
@@ -30,13 +32,17 @@ class Recombination final : public Thinning {
   void keep_first(const Sites& sites, Selection& out) const;
   void thin_line(const Sites& sites, std::size_t budget, Selection& out);
   void thin_space(const Sites& sites, std::size_t budget, Selection& out);
+  void scale_locally(const Sites& sites);
 
   int degree_;
   bool patched_;
   std::vector<std::uint32_t> live_;   ///< sites of positive weight, in lexicographic order
   std::vector<std::size_t> varying_;  ///< components
   std::vector<double> log_weight_;    ///< of the live sites
+  std::vector<double> deviation_;     ///< of the live sites, where one component varies
   Batch x_;                           ///< varying components of the live sites
+  Batch scaled_;                      ///< the same on the scale of local deviations
+  std::vector<std::uint32_t> order_;
   Buffer<std::uint64_t> items_, scratch_;
   recombination::LineRecombination line_;
   recombination::LineNodes nodes_;
@@ -51,7 +57,9 @@ void Recombination::thin(const Sites& sites, std::size_t budget, const RandomStr
   out.count.clear();
   out.discarded = 0;
   out.moved_states.reshape(0, 0);
-  if (live_.size() <= budget) return keep_all(sites, out);
+  // Patches of a given width may be fewer than the budget allows.
+  const bool by_width = patched_ && sites.width > 0 && varying_.size() == 1;
+  if (live_.size() <= budget && !by_width) return keep_all(sites, out);
   sort_sites(sites);
   if (varying_.empty()) return keep_first(sites, out);
   log_weight_.resize(live_.size());
@@ -147,8 +155,19 @@ void Recombination::thin_line(const Sites& sites, std::size_t budget, Selection&
   constexpr std::size_t most = std::numeric_limits<int>::max() / 2;
   const int degree = !patched_ && degree_ == 0 ? static_cast<int>(2 * std::min(budget, most) - 1) : degree_;
   const std::size_t in_a_patch = static_cast<std::size_t>(degree) / 2 + 1;
-  line_.reduce(x_.component(0), log_weight_, degree, patched_ ? budget : std::min(budget, in_a_patch),
-               nodes_);
+  bool evenly = patched_ && sites.deviation.nodes() == sites.x.nodes();
+  if (evenly) {
+    deviation_.resize(live_.size());
+    double largest = 0;
+    for (std::size_t j = 0; j < live_.size(); ++j)
+      largest = std::max(largest, deviation_[j] = sites.deviation(varying_.front(), live_[j]));
+    evenly = largest > 0 && std::isfinite(largest);
+  }
+  if (evenly)
+    line_.reduce_evenly(x_.component(0), log_weight_, deviation_, sites.width, degree, budget, nodes_);
+  else
+    line_.reduce(x_.component(0), log_weight_, degree, patched_ ? budget : std::min(budget, in_a_patch),
+                 nodes_);
   const std::size_t kept = nodes_.x.size();
   out.site.resize(kept);
   out.moved_states.reshape(sites.x.components(), kept);
@@ -170,11 +189,53 @@ void Recombination::thin_space(const Sites& sites, std::size_t budget, Selection
   if (degree == 0 && !patched_) degree = largest_useful;
   while (moment_number(d, degree, budget + 1) > budget) --degree;
   if (!patched_) budget = moment_number(d, degree, budget);
-  space_.reduce(x_, log_weight_, degree, budget, sites.threads, kept_);
+  const bool scaled = patched_ && sites.deviation.nodes() == sites.x.nodes();
+  if (scaled) scale_locally(sites);
+  space_.reduce(x_, scaled ? ConstBatchView(scaled_) : ConstBatchView(x_), log_weight_, degree, budget,
+                sites.threads, kept_);
   out.site.resize(kept_.point.size());
   for (std::size_t j = 0; j < kept_.point.size(); ++j) out.site[j] = live_[kept_.point[j]];
   out.log_weight.assign(kept_.log_weight.begin(), kept_.log_weight.end());
   out.discarded = kept_.discarded;
+}
+
+// scaled_ = integral of dx_i / deviation_i(x_i) for each component, the deviation being that of sites with about
+// the same x_i, on average: 64 blocks of sites, in the order of x_i. A component without noise stays as it is.
+void Recombination::scale_locally(const Sites& sites) {
+  const std::size_t n = live_.size();
+  constexpr std::size_t blocks = 64;
+  scaled_.reshape(varying_.size(), n);
+  order_.resize(n);
+  double heaviest = log_weight_.front();
+  for (const double l : log_weight_) heaviest = std::max(heaviest, l);
+  for (std::size_t i = 0; i < varying_.size(); ++i) {
+    const auto x = x_.component(i);
+    const auto y = scaled_.component(i);
+    std::iota(order_.begin(), order_.end(), 0U);
+    std::sort(order_.begin(), order_.end(),
+              [&](std::uint32_t a, std::uint32_t b) { return x[a] != x[b] ? x[a] < x[b] : a < b; });
+    std::array<double, blocks> mean{};
+    double sum = 0, mass = 0;
+    for (std::size_t b = 0; b < blocks; ++b) {
+      double in_block = 0, weight = 0;
+      for (std::size_t j = b * n / blocks; j < (b + 1) * n / blocks; ++j) {
+        const double w = std::exp(log_weight_[order_[j]] - heaviest) + 1e-300;
+        in_block += w * sites.deviation(varying_[i], live_[order_[j]]);
+        weight += w;
+      }
+      if (weight > 0) mean[b] = in_block / weight;
+      sum += in_block, mass += weight;
+    }
+    const double floor = 1e-3 * sum / mass;
+    if (!(floor > 0) || !std::isfinite(floor)) {
+      std::copy(x.begin(), x.end(), y.begin());
+      continue;
+    }
+    y[order_[0]] = 0;
+    for (std::size_t b = 0; b < blocks; ++b)
+      for (std::size_t j = std::max<std::size_t>(1, b * n / blocks); j < (b + 1) * n / blocks; ++j)
+        y[order_[j]] = y[order_[j - 1]] + (x[order_[j]] - x[order_[j - 1]]) / std::max(mean[b], floor);
+  }
 }
 
 void check_degree(int degree) {

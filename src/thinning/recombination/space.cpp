@@ -11,13 +11,19 @@
 
 namespace wienertree::recombination {
 
-void SpaceRecombination::reduce(ConstBatchView x, std::span<const double> log_weight, int degree,
-                                std::size_t budget, ThreadPool* threads, KeptPoints& out) {
+void SpaceRecombination::reduce(ConstBatchView x, ConstBatchView cut_in, std::span<const double> log_weight,
+                                int degree, std::size_t budget, ThreadPool* threads, KeptPoints& out) {
   const double largest = *std::max_element(log_weight.begin(), log_weight.end());
   partition_.reset(x.components(), x.nodes());
   for (std::size_t i = 0; i < x.components(); ++i)
-    std::copy(x.component(i).begin(), x.component(i).end(), partition_.component(i).begin());
+    std::copy(cut_in.component(i).begin(), cut_in.component(i).end(), partition_.component(i).begin());
   const double total = relative_weights(log_weight, largest, partition_.weight().data());
+  unit_.resize(x.components());
+  for (std::size_t i = 0; i < unit_.size(); ++i) {
+    const double deviation =
+        mean_deviation(x.component(i).data(), partition_.weight().data(), x.nodes()).deviation;
+    unit_[i] = deviation > 0 ? deviation : 1;
+  }
   const std::size_t most = moment_number(x.components(), degree, budget);
   partition_.cut(degree, most, budget);
 
@@ -37,8 +43,8 @@ void SpaceRecombination::reduce(ConstBatchView x, std::span<const double> log_we
     const std::size_t some = std::min(patches[k].size(), most);
     const PatchRoom room_of_patch{std::span(out.point).subspan(first_[k], some),
                                   std::span(out.log_weight).subspan(first_[k], some)};
-    result_[k] =
-        reduction_[thread].reduce(partition_, patches[k], log_weight, degree, largest, room_of_patch);
+    result_[k] = reduction_[thread].reduce(partition_, x, unit_, patches[k], log_weight, degree, largest,
+                                           room_of_patch);
   };
   if (threads != nullptr)
     threads->for_each(patches.size(), reduce_patch);
@@ -61,7 +67,8 @@ void SpaceRecombination::reduce(ConstBatchView x, std::span<const double> log_we
   out.discarded /= total;
 }
 
-PatchReduction::Result PatchReduction::reduce(const SpacePartition& partition, const Patch& patch,
+PatchReduction::Result PatchReduction::reduce(const SpacePartition& partition, ConstBatchView x,
+                                              std::span<const double> unit, const Patch& patch,
                                               std::span<const double> log_weight, int degree, double largest,
                                               PatchRoom out) {
   const auto order = partition.order().subspan(patch.begin, patch.size());
@@ -86,7 +93,7 @@ PatchReduction::Result PatchReduction::reduce(const SpacePartition& partition, c
     n += points_.weight[n] > 0 ? 1 : 0;
   }
   points_.count = n;
-  fill_box(partition, patch);
+  fill_box(x, unit, order);
   double change = 0;
   if (points_.dimension == 0 || degree == 0)
     change = keep_nearest_to_mean(weight);
@@ -103,18 +110,19 @@ PatchReduction::Result PatchReduction::reduce(const SpacePartition& partition, c
 }
 
 /// The patch's components become coordinates on [-1,1]; those that are constant are left out.
-void PatchReduction::fill_box(const SpacePartition& partition, const Patch& patch) {
+void PatchReduction::fill_box(ConstBatchView x, std::span<const double> unit,
+                              std::span<const std::uint32_t> order) {
   std::size_t varying = 0;
-  half_.resize(partition.dimension());
-  for (std::size_t i = 0; i < partition.dimension(); ++i) {
-    const std::span<const double> x = partition.component(i).subspan(patch.begin, patch.size());
+  half_.resize(x.components());
+  for (std::size_t i = 0; i < x.components(); ++i) {
+    const std::span<const double> from = x.component(i);
     const std::span<double> z(points_.z.data() + varying * points_.stride, points_.count);
-    for (std::size_t j = 0; j < z.size(); ++j) z[j] = x[points_.label[j]];
+    for (std::size_t j = 0; j < z.size(); ++j) z[j] = from[order[points_.label[j]]];
     const auto [low, high] = std::minmax_element(z.begin(), z.end());
     const double half = *high / 2 - *low / 2, centre = *low + half;
     if (!(half > 0)) continue;
     for (double& value : z) value = std::clamp((value - centre) / half, -1.0, 1.0);
-    half_[varying++] = half;
+    half_[varying++] = half / unit[i];
   }
   points_.dimension = varying;
 }

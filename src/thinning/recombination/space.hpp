@@ -33,11 +33,14 @@ class PatchReduction {
     double discarded;  ///< in units of the weight exp(largest)
   };
   /// @param largest the largest of all log-weights
-  Result reduce(const SpacePartition& partition, const Patch& patch, std::span<const double> log_weight,
-                int degree, double largest, PatchRoom out);
+  /// @param x the points, whose moments are kept; the partition may have been cut in other coordinates
+  /// @param unit the standard deviation of each component of x, or 1
+  Result reduce(const SpacePartition& partition, ConstBatchView x, std::span<const double> unit,
+                const Patch& patch, std::span<const double> log_weight, int degree, double largest,
+                PatchRoom out);
 
  private:
-  void fill_box(const SpacePartition& partition, const Patch& patch);
+  void fill_box(ConstBatchView x, std::span<const double> unit, std::span<const std::uint32_t> order);
   double keep_nearest_to_mean(double weight);
   const PolynomialBasis& basis(std::size_t dimension, int degree);
 
@@ -53,12 +56,14 @@ class SpaceRecombination {
  public:
   /// @param x components that vary, d >= 2 x n;  log_weight n values > -infinity;  n > budget
   /// @param degree r >= 0 with (d + r choose r) <= budget; r = 0 keeps the point nearest to a patch's mean
+  /// @param cut_in d x n: coordinates that the patches are cut in
   /// @param threads to reduce patches on, if any
-  void reduce(ConstBatchView x, std::span<const double> log_weight, int degree, std::size_t budget,
-              ThreadPool* threads, KeptPoints& out);
+  void reduce(ConstBatchView x, ConstBatchView cut_in, std::span<const double> log_weight, int degree,
+              std::size_t budget, ThreadPool* threads, KeptPoints& out);
 
  private:
   SpacePartition partition_;
+  std::vector<double> unit_;
   std::vector<PatchReduction> reduction_;  ///< one a thread
   std::vector<std::size_t> first_;         ///< where each patch's points go
   std::vector<PatchReduction::Result> result_;
