@@ -231,6 +231,10 @@ TEST_CASE("weak: comparisons, if, sign and their compositions by the law of the 
   CHECK(value(gbm, "(1+sign(s-100))/2") == Approx(digital).epsilon(1e-8));
   CHECK(value(gbm, "if(s>100,s-100,0)") == Approx(call).epsilon(1e-7));
   CHECK(value(gbm, "max(s-100,0)-max(s-100,0)*(s<=100)") == Approx(call).epsilon(1e-7));
+  // Kinks inside kinks, and two strikes in one maximum; quadrature of the lognormal density.
+  CHECK(value(gbm, "abs(abs(s-100)-5)") == Approx(12.826834653).epsilon(1e-6));
+  CHECK(value(gbm, "max(max(s-100,110-s),0)") == Approx(21.738121881).epsilon(1e-6));
+  CHECK(value(gbm, "sqrt(max(s-100,0))*s") == Approx(286.447483367).epsilon(1e-6));
   // Two kinks of one argument: a call spread and the band between the strikes.
   CHECK(value(gbm, "(s>90)*(s<110)") == Approx(value(gbm, "s>90") - value(gbm, "s>110")).epsilon(1e-7));
 }
