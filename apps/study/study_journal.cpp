@@ -103,8 +103,9 @@ RunRecord StudyJournal::parse(const std::string& line, std::size_t number) const
   return r;
 }
 
+// After the constructor it delegates to, what this one opens is closed by the destructor also where it throws.
 StudyJournal::StudyJournal(const std::string& directory, std::vector<std::string> quantities)
-    : file_(directory + "/runs.csv"), quantities_(std::move(quantities)) {
+    : StudyJournal(directory + "/runs.csv", std::move(quantities), Nothing{}) {
   lock_ = ::open(directory.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
   if (lock_ < 0) throw InputError("cannot be opened: " + reason(), "--output", directory);
   if (::flock(lock_, LOCK_EX | LOCK_NB) != 0)

@@ -2,6 +2,7 @@
 /// The runs of a study on disk: a row each, written as it is finished, so that what was killed can go on.
 #include <cstdint>
 #include <string>
+#include <utility>
 #include <vector>
 
 namespace wienertree::app {
@@ -35,6 +36,9 @@ class StudyJournal {
   void rewrite(const std::vector<RunRecord>& records);
 
  private:
+  struct Nothing {};
+  StudyJournal(std::string file, std::vector<std::string> quantities, Nothing)
+      : file_(std::move(file)), quantities_(std::move(quantities)) {}
   void write_line(const std::string& line);
   std::string line_of(const RunRecord& record) const;
   std::string header() const;
