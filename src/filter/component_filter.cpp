@@ -20,12 +20,19 @@ constexpr double negligible = 1e-14;  // of the largest weight
 // than the shoulders of a heavy tail, at the price of twice the area in two dimensions.
 constexpr double posterior_widening = 2;
 
+// Standard deviation of the logarithm of exact over linearised likelihood in a component above which it is split: a
+// degree-5 rule then errs by about its cube.
+constexpr double sharp = 0.05;
+
+// Components are split to no less than this part of the posterior's width before they are conditioned.
+constexpr double narrowest = 0.1;
+
 // Departure of a component from Gaussian over a substep, in units of FilterOptions::substep_tolerance. Merging, once
 // a substep, costs little in two dimensions and much in four, where patches are wide.
 double substep_factor(std::size_t d) { return d == 2 ? 0.1 : d == 3 ? 0.3 : 1.0; }
 
 // Width of a component in the tilted law, in standard deviations.
-double default_kappa(std::size_t d) { return d <= 3 ? 0.15 : d == 4 ? 0.25 : 0.35; }
+double default_kappa(std::size_t d) { return d <= 3 ? 0.15 : d == 4 ? 0.28 : 0.35; }
 
 bool missing(std::span<const double> y) {
   return std::all_of(y.begin(), y.end(), [](double v) { return std::isnan(v); });
@@ -52,7 +59,7 @@ std::optional<LinearGaussianModel> affine_signal(const Model& model) {
 }  // namespace
 
 std::size_t default_components(std::size_t dimension) {
-  return dimension <= 2 ? 200 : dimension == 3 ? 400 : 1000;
+  return dimension <= 3 ? 400 : dimension == 4 ? 4000 : 3000;
 }
 
 ComponentFilter::ComponentFilter(const Model& model, const FilterOptions& options)
@@ -211,7 +218,7 @@ std::size_t ComponentFilter::substeps_for(const MixtureMoments& law, double leng
   const auto points = static_cast<std::size_t>(rule.weights.size());
   const Eigen::MatrixXd L = semidefinite_root(law.covariance);
   GaussianComponents probe;
-  for (std::size_t K = 2;; K += K < 4 ? 1 : K / 2) {
+  for (std::size_t K = d_ <= 3 ? 2 : 1;; K += K < 4 ? 1 : K / 2) {
     const double s = length / static_cast<double>(K);
     probe.reshape(d_, points);
     for (std::size_t q = 0; q < points; ++q) {
@@ -338,7 +345,13 @@ std::vector<Tilt> ComponentFilter::plan(const ObservationWindow& window, std::sp
 void ComponentFilter::weigh(const ObservationWindow& window, std::span<const double> y, double clock) {
   if (y.empty() || missing(y)) return;
   check_reach(window, y, clock);
-  split_and_weigh(y, clock);
+  const double departure = split_and_weigh(y, clock);
+  if (departure > 0.5)
+    warn(WarningKind::unfit_tilt, window.end,
+         fmt::format("components of a tenth of the law's width are too wide for the likelihood, whose "
+                     "logarithm departs "
+                     "from a quadratic by {:.2g} in them",
+                     departure));
   const LargestLogWeight largest = largest_log_weight(components_.log_weight);
   if (!largest.all_valid || !(largest.value > -std::numeric_limits<double>::infinity()))
     throw RunError("the observation has no likelihood", place_and_observation(window));
@@ -389,13 +402,14 @@ Eigen::MatrixXd ComponentFilter::informed(std::span<const double> y, double cloc
 }
 
 // Components that are too wide for the likelihood are split in the coordinates of the posterior that they gave,
-// tilted towards it, to half, a third and a quarter and less of its width.
-void ComponentFilter::split_and_weigh(std::span<const double> y, double clock) {
+// tilted towards it, to half of its width and less.
+double ComponentFilter::split_and_weigh(std::span<const double> y, double clock) {
   predicted_ = components_;
   double departure = conditioning_->condition(y, clock, components_, &threads_).departure;
   const MixtureMoments before = moments(predicted_);
-  for (const double kappa : {0.5, 0.35, 0.25, 0.15}) {
-    if (!(departure > 0.2)) return;
+  double kappa = 0.5;
+  for (int round = 0; round < 4; ++round) {
+    if (!(departure > sharp)) return 0;
     const MixtureMoments after = moments(components_);
     const Tilt tilt =
         tilt_between({before.mean, before.covariance}, {after.mean, posterior_widening * after.covariance});
@@ -410,7 +424,11 @@ void ComponentFilter::split_and_weigh(std::span<const double> y, double clock) {
     merge_.merge(components_, 8 * options_.nodes);
     divide_by(tilt);
     departure = conditioning_->condition(y, clock, components_, &threads_).departure;
+    if (kappa <= narrowest) break;
+    // The departure falls with the square of the width, or faster.
+    kappa = std::clamp(kappa * std::sqrt(sharp / departure), narrowest, 0.7 * kappa);
   }
+  return departure > sharp ? departure : 0;
 }
 
 // (y - predicted)^2/S of each component of y with Gaussian noise.

@@ -53,7 +53,8 @@ class ComponentFilter final : public Filter {
   void move(double clock, double length, unsigned steps);
   unsigned steps_for(double length) const;
   void weigh(const ObservationWindow& window, std::span<const double> y, double clock);
-  void split_and_weigh(std::span<const double> y, double clock);
+  /// Returns what ComponentConditioning calls the departure, if components are still too wide, or 0.
+  double split_and_weigh(std::span<const double> y, double clock);
   Eigen::MatrixXd informed(std::span<const double> y, double clock, const MixtureMoments& predicted,
                            const MixtureMoments& law, double kappa);
   void check_reach(const ObservationWindow& window, std::span<const double> y, double clock);
