@@ -6,10 +6,10 @@
 #include <cstring>
 #include <fstream>
 
-#include "checksum.hpp"
 #include "wienertree/numeric/error.hpp"
 #include "wienertree/numeric/memory.hpp"
 #include "wienertree/numeric/read_all.hpp"
+#include "wienertree/run/checksum.hpp"
 
 namespace wienertree::app {
 namespace {

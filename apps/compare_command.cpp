@@ -5,15 +5,16 @@
 #include <memory>
 #include <set>
 
-#include "checksum.hpp"
 #include "command_line.hpp"
 #include "commands.hpp"
 #include "compare_plot.hpp"
 #include "compare_run.hpp"
 #include "data_directory.hpp"
 #include "output.hpp"
+#include "standard_input.hpp"
 #include "wienertree/cubature/formula_file.hpp"
 #include "wienertree/model/text_model.hpp"
+#include "wienertree/run/checksum.hpp"
 #include "wienertree/version.hpp"
 
 namespace wienertree::app {
@@ -176,7 +177,7 @@ void compare_and_write(const CompareArguments& a) {
   }
   OutputFile output("--output", a.output.value_or("-"));
   std::vector<std::unique_ptr<WindowSource>> windows;
-  for (const Contender& c : all) windows.push_back(open_windows(*a.observations, c.model, a.steps));
+  for (const Contender& c : all) windows.push_back(windows_of(*a.observations, c.model, a.steps));
   SavedRun saved(a.saving, identity_of(all, *windows.front()));
   const std::vector<ComparisonRow> rows = compare(all, windows, !a.quiet, saved);
   const bool several = all.front().setup.launches > 1;

@@ -4,9 +4,9 @@
 
 #include <cmath>
 
-#include "launches.hpp"
 #include "progress.hpp"
-#include "window_source.hpp"
+#include "wienertree/run/launches.hpp"
+#include "wienertree/run/window_source.hpp"
 
 namespace wienertree::app {
 namespace {

@@ -6,7 +6,7 @@
 
 #include "filter_arguments.hpp"
 #include "saved_run.hpp"
-#include "window_source.hpp"
+#include "wienertree/run/window_source.hpp"
 
 namespace wienertree::app {
 

@@ -3,8 +3,8 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <thread>
 
+#include "data_directory.hpp"
 #include "formula_choice.hpp"
 #include "tree_choices.hpp"
 #include "wienertree/filter/filter_memory.hpp"
@@ -29,12 +29,6 @@ const Choices<FunctionalMethod> functionals = {{"picard", FunctionalMethod::pica
                                                {"second-order", FunctionalMethod::second_order}};
 const Choices<OnNodeFailure> failures = {{"stop", OnNodeFailure::stop}, {"drop", OnNodeFailure::drop}};
 
-// Whether a filter moves particles by random numbers.
-bool moves_particles(FilterMethod method) {
-  return method == FilterMethod::euler || method == FilterMethod::gaussian_mixture ||
-         method == FilterMethod::weighted;
-}
-
 // An option given where it means nothing is a mistake worth telling.
 void refuse_if(bool given, const char* option, const std::string& reason) {
   if (given) throw InputError(reason, option);
@@ -42,7 +36,7 @@ void refuse_if(bool given, const char* option, const std::string& reason) {
 
 void refuse_tree_options(const FilterArguments& a, const std::string& reason) {
   refuse_if(a.degree.has_value(), "--degree", reason);
-  refuse_if(a.formula.has_value(), "--formula", reason);
+  refuse_if(a.formula_name.has_value(), "--formula", reason);
   refuse_if(a.prune_weights.has_value(), "--prune-weights", reason);
   refuse_if(a.recombination_degree.has_value(), "--recombination-degree", reason);
   refuse_if(a.flow.has_value(), "--flow", reason);
@@ -91,7 +85,6 @@ void refuse_inapplicable(const FilterArguments& a, const Model& model, FilterMet
     refuse_thinning_options(a, with_method);
     refuse_if(a.nodes && method != FilterMethod::grid, "--nodes", with_method);
     refuse_if(a.functional.has_value(), "--functional", with_method);
-    refuse_if(a.threads.has_value(), "--threads", with_method);
     return;
   }
   if (method == FilterMethod::full_tree) {
@@ -112,44 +105,13 @@ void refuse_inapplicable(const FilterArguments& a, const Model& model, FilterMet
   refuse_if(a.flow == FlowMethod::exact && a.absolute_tolerance, "--atol", with_exact_flow);
 }
 
-ThinningMethod thinning_of(const FilterArguments& a, FilterMethod method) {
-  // Recombination merges states, which a likelihood carried along each path does not allow.
-  const bool carried = a.prune_weights == PruneWeights::cubature;
-  if (method == FilterMethod::klv)
-    return a.thin.value_or(carried ? ThinningMethod::tbba : ThinningMethod::recombination);
-  if (method == FilterMethod::euler) return a.thin.value_or(ThinningMethod::systematic);
-  if (method == FilterMethod::gaussian_mixture) return a.thin.value_or(ThinningMethod::tbba);
-  return ThinningMethod::none;
-}
-
-// Recombination needs few nodes, since it keeps moments; random thinning many.
-std::size_t default_nodes(FilterMethod method, ThinningMethod thin, std::size_t dimension) {
-  if (method == FilterMethod::grid) return FilterOptions{}.grid_points;
-  if (method == FilterMethod::euler || method == FilterMethod::weighted) return 10000;
-  if (method == FilterMethod::gaussian_mixture) return 1000;
-  if (recombines(thin)) return dimension == 1 ? 60 : dimension == 2 ? 300 : 600;
-  return dimension == 1 ? 1000 : 10000;
-}
-
-// Discrete observations leave no error but the formula's: degree 7, where a formula is shipped, costs two to
-// four times degree 5 and errs a tenth or less (docs/volatility.md). A functional of a continuous record is
-// of order 2, which degree 5 matches.
-std::optional<std::uint64_t> degree_for(const FilterArguments& a, const Model& model) {
-  constexpr std::size_t most_motions = 3;
-  if (a.degree || a.formula || model.observation != ObservationKind::discrete) return a.degree;
-  return model.noise_dimension() <= most_motions ? 7 : 5;
-}
-
-// Below this many nodes, threads wait for each other longer than they work.
-constexpr std::size_t nodes_worth_threads = 5000;
-
 }  // namespace
 
 void add_tree_options(CLI::App& app, FilterArguments& a) {
   add_count(app, "--degree", a.degree, 1,
             "Degree of the cubature formula [5, or 7 for discrete observations of up to 3 Brownian motions]",
             99);
-  add_text(app, "--formula", a.formula, "NAME|FILE", "The cubature formula itself, instead of --degree");
+  add_text(app, "--formula", a.formula_name, "NAME|FILE", "The cubature formula itself, instead of --degree");
   add_count(app, "--nodes", a.nodes, 1,
             "Nodes kept at each step, or cells of the grid [by method and dimension]", 1'000'000'000);
   add_choice(app, "--thin", a.thin, thinnings, "How nodes are thinned out");
@@ -171,7 +133,8 @@ void add_tree_options(CLI::App& app, FilterArguments& a) {
 }
 
 void add_filter_options(CLI::App& app, FilterArguments& a) {
-  add_choice(app, "--method", a.method, methods, "The filter [klv]");
+  add_choice(app, "--method", a.method, methods,
+             "The filter [exact where the model has an exact one, else klv]");
   add_tree_options(app, a);
   add_number(app, "--ess-threshold", a.ess_threshold, Sign::any,
              "Random thinning goes by likelihoods when the effective sample size is at most this part "
@@ -192,61 +155,20 @@ void add_moments(CLI::App& app, std::optional<std::uint64_t>& moments) {
   add_count(app, "--moments", moments, 2, "Also the raw moments E[x^2] .. E[x^K]", 20);
 }
 
-std::optional<FilterMethod> exact_method(const Model& model) {
-  switch (model.exact_filter) {
-    case ExactFilter::none:
-      return {};
-    case ExactFilter::benes:
-      return FilterMethod::benes;
-    case ExactFilter::kalman_bucy:
-      return FilterMethod::kalman_bucy;
-    case ExactFilter::kalman:
-      return FilterMethod::kalman;
-  }
-  return {};
-}
-
 std::string method_name(FilterMethod method) { return name_of(methods, method); }
 
-bool keeps_nodes(FilterMethod method) {
-  return method == FilterMethod::klv || method == FilterMethod::full_tree || moves_particles(method);
-}
-
 FilterSetup filter_setup(const FilterArguments& a, const Model& model) {
-  FilterSetup setup;
-  FilterOptions& o = setup.options;
-  o.method = a.method.value_or(FilterMethod::klv);
-  if (o.method == FilterMethod::klv && a.thin == ThinningMethod::none) o.method = FilterMethod::full_tree;
-  o.thinning.method = thinning_of(a, o.method);
-  refuse_inapplicable(a, model, o.method, o.thinning.method);
-  const std::size_t nodes =
-      a.nodes.value_or(default_nodes(o.method, o.thinning.method, model.reported_dimension()));
-  (o.method == FilterMethod::grid ? o.grid_points : o.nodes) = nodes;
-  if (!keeps_nodes(o.method)) {
-    refuse_oversized_filter(model, o);
-    return setup;
-  }
-  if (!moves_particles(o.method))
-    o.formula = choose_formula(degree_for(a, model), a.formula, model.noise_dimension());
-  o.thinning.order = a.order.value_or(SiteOrder::spatial);
-  o.thinning.recombination_degree = static_cast<int>(a.recombination_degree.value_or(0));
-  o.prune_weights = a.prune_weights.value_or(PruneWeights::likelihood);
-  o.functional = a.functional.value_or(FunctionalMethod::second_order);
-  o.flow = a.flow.value_or(FlowMethod::automatic);
-  o.tolerance.relative = a.relative_tolerance.value_or(o.tolerance.relative);
-  o.tolerance.absolute = a.absolute_tolerance.value_or(o.tolerance.absolute);
-  o.on_node_failure = a.on_node_failure.value_or(OnNodeFailure::stop);
-  o.ess_threshold = a.ess_threshold.value_or(o.ess_threshold);
-  o.alpha = a.alpha;
-  o.beta = a.beta.value_or(o.beta);
-  o.seed = a.seed.value_or(1);
-  const bool many = o.method == FilterMethod::full_tree || o.nodes >= nodes_worth_threads;
-  o.threads =
-      static_cast<unsigned>(a.threads.value_or(many ? std::max(1U, std::thread::hardware_concurrency()) : 1));
-  setup.launches = static_cast<std::uint32_t>(a.launches.value_or(1));
-  refuse_oversized_filter(model, o, setup.launches);
-  setup.random =
-      moves_particles(o.method) || (o.method == FilterMethod::klv && !recombines(o.thinning.method));
+  GivenOptions given = a;
+  if (a.formula_name && !given.formula) given.formula.emplace();  // to be loaded for a tree
+  FilterMethod method = recommended_method(model, given);
+  given.method = method;
+  if (method == FilterMethod::klv && a.thin == ThinningMethod::none) method = FilterMethod::full_tree;
+  refuse_inapplicable(a, model, method, recommended_thinning(a, method));
+  const bool tree = method == FilterMethod::klv || method == FilterMethod::full_tree;
+  if (tree && a.formula_name)
+    given.formula = choose_formula(a.degree, a.formula_name, model.noise_dimension());
+  FilterSetup setup = recommended_options(model, given, formulas_directory());
+  refuse_oversized_filter(model, setup.options, setup.launches);
   return setup;
 }
 

@@ -6,22 +6,13 @@
 
 #include "command_line.hpp"
 #include "table.hpp"
-#include "wienertree/filter/filter.hpp"
+#include "wienertree/run/recommended_options.hpp"
 
 namespace wienertree::app {
 
 /// What was given on the command line; nothing else.
-struct FilterArguments {
-  std::optional<FilterMethod> method;
-  std::optional<std::uint64_t> degree, nodes, seed, launches, threads, recombination_degree;
-  std::optional<std::string> formula;
-  std::optional<ThinningMethod> thin;
-  std::optional<SiteOrder> order;
-  std::optional<PruneWeights> prune_weights;
-  std::optional<FunctionalMethod> functional;
-  std::optional<FlowMethod> flow;
-  std::optional<double> relative_tolerance, absolute_tolerance, ess_threshold, alpha, beta;
-  std::optional<OnNodeFailure> on_node_failure;
+struct FilterArguments : GivenOptions {
+  std::optional<std::string> formula_name;  ///< a bundled name or a file, in place of `formula`
 };
 
 /// How the tree grows, is weighted and thinned.
@@ -33,23 +24,12 @@ void add_filter_options(CLI::App& app, FilterArguments& arguments);
 void add_record_steps(CLI::App& app, std::optional<std::uint64_t>& steps);
 void add_moments(CLI::App& app, std::optional<std::uint64_t>& moments);
 
-/// What will be run.
-struct FilterSetup {
-  FilterOptions options;
-  std::uint32_t launches = 1;
-  bool random = false;  ///< whether a seed changes the result
-};
-
-/// Fills in the defaults and loads the formula.
+/// Loads the formula; what was not given is as recommended_options says.
 /// @throws InputError for an option that does not apply to the method, the model or another option, and when
 /// there is no formula of the degree
 FilterSetup filter_setup(const FilterArguments& arguments, const Model& model);
 
-/// The filter that solves this model exactly, if one is known to.
-std::optional<FilterMethod> exact_method(const Model& model);
 std::string method_name(FilterMethod method);
-/// Whether a filter moves weighted nodes, rather than a density in closed form or on a grid.
-bool keeps_nodes(FilterMethod method);
 
 /// Names and values of all options in force.
 Json options_in_force(const FilterSetup& setup, const Model& model);

@@ -4,16 +4,18 @@
 #include <cstdio>
 #include <memory>
 
-#include "checksum.hpp"
 #include "command_line.hpp"
 #include "commands.hpp"
 #include "data_directory.hpp"
+#include "filter_arguments.hpp"
 #include "filter_report.hpp"
 #include "filter_table.hpp"
 #include "output.hpp"
 #include "signal_file.hpp"
+#include "standard_input.hpp"
 #include "wienertree/cubature/formula_file.hpp"
 #include "wienertree/model/text_model.hpp"
+#include "wienertree/run/checksum.hpp"
 
 namespace wienertree::app {
 namespace {
@@ -106,7 +108,7 @@ void filter_and_write(const FilterCommandArguments& a) {
   OutputFile output("--output", a.output.value_or("-"));
   std::optional<ObservationPath> signal;
   if (a.signal) signal = read_signal(*a.signal, model);
-  const auto windows = open_windows(*a.observations, model, a.steps, a.saving.resume.has_value());
+  const auto windows = windows_of(*a.observations, model, a.steps, a.saving.resume.has_value());
 
   const int highest_moment = static_cast<int>(a.moments.value_or(0));
   const FilterContext context{model, setup, *windows, *a.observations, highest_moment};

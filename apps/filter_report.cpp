@@ -1,4 +1,5 @@
 #include "filter_report.hpp"
+#include "filter_arguments.hpp"
 
 #include <fmt/format.h>
 

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "filter_arguments.hpp"
 #include "filter_table.hpp"
 #include "progress.hpp"
 #include "wienertree/numeric/memory.hpp"

@@ -6,9 +6,9 @@
 #include <vector>
 
 #include "density_plot.hpp"
-#include "launches.hpp"
 #include "saved_run.hpp"
-#include "window_source.hpp"
+#include "wienertree/run/launches.hpp"
+#include "wienertree/run/window_source.hpp"
 
 namespace wienertree::app {
 

@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "launches.hpp"
+#include "wienertree/run/launches.hpp"
 
 namespace wienertree::app {
 

@@ -5,8 +5,8 @@
 #include <fstream>
 #include <sstream>
 
-#include "checksum.hpp"
 #include "data_directory.hpp"
+#include "wienertree/run/checksum.hpp"
 #include "wienertree/version.hpp"
 
 namespace wienertree::app {

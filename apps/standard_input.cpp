@@ -3,6 +3,7 @@
 #include <unistd.h>
 
 #include <cerrno>
+#include <istream>
 #include <system_error>
 
 #include "interruption.hpp"
@@ -21,6 +22,45 @@ StandardInput::int_type StandardInput::underflow() {
     setg(buffer_.data(), buffer_.data(), buffer_.data() + size);
     return traits_type::to_int_type(buffer_[0]);
   }
+}
+
+namespace {
+
+// Standard input as a stream; a member of its own so that it is there before the windows that read it.
+struct InputStream {
+  StandardInput input;
+  std::istream stream{&input};
+};
+
+class StandardInputWindows final : InputStream, public WindowSource {
+ public:
+  StandardInputWindows(const Model& model, bool resumed)
+      : windows_(follow_windows(stream, "standard input", model, resumed,
+                                [this] { return input.interrupted(); })) {}
+  bool next(ObservationWindow& window) override { return windows_->next(window); }
+  double start() const override { return windows_->start(); }
+  bool observed_at_start() const override { return windows_->observed_at_start(); }
+  std::optional<double> end() const override { return windows_->end(); }
+  std::size_t size() const override { return windows_->size(); }
+  std::size_t rows() const override { return windows_->rows(); }
+  bool has_inner_rows() const override { return windows_->has_inner_rows(); }
+  bool streams() const override { return windows_->streams(); }
+  std::string identity() const override { return windows_->identity(); }
+  void exchange(StateArchive& archive) override { windows_->exchange(archive); }
+
+ private:
+  std::unique_ptr<WindowSource> windows_;
+};
+
+}  // namespace
+
+std::unique_ptr<WindowSource> windows_of(const std::string& observations, const Model& model,
+                                         std::optional<std::size_t> steps, bool resumed) {
+  if (observations != "-") return open_windows(observations, model, steps);
+  if (steps)
+    throw InputError("needs the whole record; with --observations - every row ends a step", "--steps",
+                     std::to_string(*steps));
+  return std::make_unique<StandardInputWindows>(model, resumed);
 }
 
 }  // namespace wienertree::app

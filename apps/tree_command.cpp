@@ -12,10 +12,11 @@
 #include "data_directory.hpp"
 #include "filter_arguments.hpp"
 #include "output.hpp"
+#include "standard_input.hpp"
 #include "tree_plot.hpp"
 #include "wienertree/model/text_model.hpp"
+#include "wienertree/run/window_source.hpp"
 #include "wienertree/tree/genealogy.hpp"
-#include "window_source.hpp"
 
 namespace wienertree::app {
 namespace {
@@ -163,7 +164,7 @@ void write_tree(const TreeArguments& a) {
     if (model.observation == ObservationKind::none)
       throw InputError("the model has no [observation]: give --horizon instead", "--observations",
                        *a.observations);
-    const auto windows = open_windows(*a.observations, model, a.steps);
+    const auto windows = windows_of(*a.observations, model, a.steps);
     return grow_tree(model, setup, *windows);
   }();
   if (dot) stage(*dot, genealogy, write_graphviz);

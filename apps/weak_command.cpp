@@ -6,13 +6,13 @@
 #include <cstdio>
 #include <memory>
 
-#include "checksum.hpp"
 #include "commands.hpp"
 #include "output.hpp"
 #include "progress.hpp"
 #include "saved_run.hpp"
 #include "weak_outcome.hpp"
 #include "wienertree/cubature/formula_file.hpp"
+#include "wienertree/run/checksum.hpp"
 #include "wienertree/version.hpp"
 
 namespace wienertree::app {

@@ -3,12 +3,12 @@ include(CMakePackageConfigHelpers)
 # wienertree::wienertree is the library (BSD-3). wienertree::text_model is apart, because it links GiNaC (GPL-2+).
 add_library(wienertree INTERFACE)
 add_library(wienertree::wienertree ALIAS wienertree)
-target_link_libraries(wienertree INTERFACE wienertree_study wienertree_filter wienertree_weak
+target_link_libraries(wienertree INTERFACE wienertree_run wienertree_study wienertree_filter wienertree_weak
   wienertree_tree wienertree_thinning wienertree_cubature wienertree_model wienertree_numeric)
 
 # Three components: program (with its data), development, python.
 set(installed wienertree wienertree_numeric wienertree_model wienertree_cubature wienertree_thinning wienertree_tree wienertree_weak
-  wienertree_filter wienertree_study)
+  wienertree_filter wienertree_study wienertree_run)
 if(WIENERTREE_TEXT_MODELS)
   list(APPEND installed wienertree_text_model)
 endif()

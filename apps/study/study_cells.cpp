@@ -159,6 +159,8 @@ FilterCell parse_filter_cell(const CellOptions& options, ModelShelf& models, con
     if (cell.model->observation == ObservationKind::none)
       throw InputError("the model has no [observation]: there is nothing to filter by",
                        "model " + cell.model->name);
+    // A study measures approximations: it has the exact filter for its truth.
+    if (!arguments.method) arguments.method = FilterMethod::klv;
     cell.setup = filter_setup(arguments, *cell.model);
     cell.setup.options.threads = static_cast<unsigned>(arguments.threads.value_or(1));
     cell.steps = steps;

@@ -6,9 +6,9 @@
 #include <cmath>
 #include <limits>
 
-#include "../window_source.hpp"
 #include "wienertree/filter/simulate.hpp"
 #include "wienertree/numeric/memory.hpp"
+#include "wienertree/run/window_source.hpp"
 #include "wienertree/study/wasserstein.hpp"
 
 namespace wienertree::app {

@@ -35,18 +35,15 @@ FilterSession::FilterSession(const py::object& model, const py::object& observat
   set_options(app, options);
   if (formula && requested.filter.degree)
     throw InputError("give --formula or --degree, not both", "--formula", formula->name);
+  if (formula) require_usable(*formula, m.noise_dimension());
+  requested.filter.formula = formula;
   setup_ = app::filter_setup(requested.filter, m);
-  if (formula) {
-    if (setup_.options.formula.paths.empty())
-      throw InputError("has no meaning with --method " + app::method_name(setup_.options.method),
-                       "--formula");
-    require_usable(*formula, m.noise_dimension());
-    setup_.options.formula = *formula;
-  }
+  if (formula && setup_.options.formula.paths.empty())
+    throw InputError("has no meaning with --method " + app::method_name(setup_.options.method), "--formula");
   highest_moment_ = static_cast<int>(requested.moments.value_or(0));
   read(observations, requested.steps);
   refuse_oversized_tree(m, setup_.options, windows_->size());
-  launches_ = std::make_unique<app::Launches>(m, setup_);
+  launches_ = std::make_unique<Launches>(m, setup_);
 }
 
 void FilterSession::read(const py::object& observations, std::optional<std::size_t> steps) {
@@ -54,7 +51,7 @@ void FilterSession::read(const py::object& observations, std::optional<std::size
   if (is_file(observations)) {
     const auto file = py::module_::import("os").attr("fspath")(observations).cast<std::string>();
     if (file == "-") throw InputError("standard input is not read here", "observations", file);
-    windows_ = app::open_windows(file, m, steps);
+    windows_ = open_windows(file, m, steps);
     return;
   }
   if (py::hasattr(observations, "observations")) {  // a Simulation
@@ -76,7 +73,7 @@ void FilterSession::read(const py::object& observations, std::optional<std::size
         "dimensions " + std::to_string(times_.ndim()) + " and " + std::to_string(values_.ndim()));
   const ObservationRows rows{m.observation_dimension(), values_of(times_), values_of(values_)};
   check_observations(rows, "observations", m.observation);
-  windows_ = app::cut_windows(rows, m, steps);
+  windows_ = cut_windows(rows, m, steps);
 }
 
 bool FilterSession::advance() {

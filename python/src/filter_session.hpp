@@ -10,9 +10,9 @@
 #include "arrays.hpp"
 #include "filter_arguments.hpp"
 #include "interrupts.hpp"
-#include "launches.hpp"
 #include "models.hpp"
-#include "window_source.hpp"
+#include "wienertree/run/launches.hpp"
+#include "wienertree/run/window_source.hpp"
 
 namespace wienertree::python {
 
@@ -33,14 +33,14 @@ class FilterSession {
   /// Goes to the next law and sums it up: that of the start, unless it is observed, then those at the ends of
   /// the windows; false where there is none, or once it has thrown. Needs no lock of the interpreter.
   bool advance();
-  const app::LaunchesSummary& row() const { return row_; }
+  const LaunchesSummary& row() const { return row_; }
   /// @pre advance() was called
   const Posterior& posterior() { return launches_->posterior(); }
   /// Laws so far.
   std::size_t steps() const { return steps_; }
   FilterStatistics statistics() const { return launches_->statistics(); }
 
-  const app::FilterSetup& setup() const { return setup_; }
+  const FilterSetup& setup() const { return setup_; }
   const TextModel& text() const { return model_.text(); }
   std::vector<std::string> states() const;
   py::dict options_in_force() const;
@@ -62,13 +62,13 @@ class FilterSession {
   void read(const py::object& observations, std::optional<std::size_t> steps);
 
   PyModel model_;
-  app::FilterSetup setup_;
+  FilterSetup setup_;
   int highest_moment_ = 0;
   Doubles times_, values_;  ///< keep the memory that windows_ refers to
-  std::unique_ptr<app::WindowSource> windows_;
-  std::unique_ptr<app::Launches> launches_;
+  std::unique_ptr<WindowSource> windows_;
+  std::unique_ptr<Launches> launches_;
   ObservationWindow window_;
-  app::LaunchesSummary row_;
+  LaunchesSummary row_;
   std::size_t steps_ = 0;
   bool finished_ = false;
   std::atomic<bool> in_use_ = false;

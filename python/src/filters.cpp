@@ -20,7 +20,7 @@ struct Columns {
   std::vector<double> log_bayes_factor, log_variance;
   std::vector<std::vector<double>> moments;  // moments[k-2]
 
-  void append(const app::LaunchesSummary& row, bool several) {
+  void append(const LaunchesSummary& row, bool several) {
     const auto extend = [](std::vector<double>& to, const std::vector<double>& from) {
       to.insert(to.end(), from.begin(), from.end());
     };
@@ -103,7 +103,7 @@ class StepPosterior {
  public:
   explicit StepPosterior(std::shared_ptr<FilterSession> session)
       : session_(std::move(session)), step_(session_->steps()), row_(session_->row()) {}
-  const app::LaunchesSummary& row() const { return row_; }
+  const LaunchesSummary& row() const { return row_; }
   const FilterSession& session() const { return *session_; }
 
   // Calls f with the law itself. @throws RunError if it is gone
@@ -127,7 +127,7 @@ class StepPosterior {
  private:
   std::shared_ptr<FilterSession> session_;
   std::size_t step_;
-  app::LaunchesSummary row_;
+  LaunchesSummary row_;
 };
 
 py::array_t<double> copied(ConstBatchView view) {

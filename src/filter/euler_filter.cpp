@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "wienertree/filter/bounds.hpp"
+#include "wienertree/filter/clock.hpp"
 #include "wienertree/tree/initial.hpp"
 
 namespace wienertree {
@@ -30,11 +31,15 @@ EulerFilter::EulerFilter(const Model& model, const FilterOptions& options)
 
 void EulerFilter::advance(const ObservationWindow& window) {
   resample_if_due(window);
+  set_clock(model_, x_, window.start);
   pool_.for_each((x_.nodes() + block - 1) / block, [&](std::size_t task, std::size_t thread) {
     const std::size_t first = task * block;
     step(window, first, std::min(block, x_.nodes() - first), scratch_[thread]);
   });
-  if (window.length() > 0) x_.swap(next_);
+  if (window.length() > 0) {
+    x_.swap(next_);
+    set_clock(model_, x_, window.end);
+  }
   weighed_ = weighed_ || model_.observation == ObservationKind::continuous || !window.observation.empty();
   check_log_weights(log_weight_, window);
   stale_ = true;

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "wienertree/filter/bounds.hpp"
+#include "wienertree/filter/clock.hpp"
 #include "wienertree/filter/expectation.hpp"
 #include "wienertree/tree/initial.hpp"
 
@@ -51,11 +52,13 @@ void GaussianMixtureFilter::for_each_block(Body body) {
 
 void GaussianMixtureFilter::advance(const ObservationWindow& window) {
   if (statistics_.steps > 0) correct(window);
+  set_clock(model_, v_, window.start);
   for_each_block(
       [&](std::size_t first, std::size_t count, Scratch& scratch) { step(window, first, count, scratch); });
   weighed_ = weighed_ || model_.observation == ObservationKind::continuous || !window.observation.empty();
   if (window.length() > 0) {
     v_.swap(next_);
+    set_clock(model_, v_, window.end);
     spread_ = spread_ || alpha_ > 0;
   }
   check_log_weights(log_weight_, window);

@@ -8,9 +8,10 @@
 #include <limits>
 #include <utility>
 
+#include "wienertree/filter/clock.hpp"
 #include "wienertree/filter/places.hpp"
-#include "wienertree/tree/initial.hpp"
 #include "wienertree/numeric/log_weights.hpp"
+#include "wienertree/tree/initial.hpp"
 #include "wienertree/tree/tree_size.hpp"
 
 namespace wienertree {
@@ -100,6 +101,7 @@ KlvFilter::LogWeights& KlvFilter::likelihood_of(Generation& g) const {
 }
 
 void KlvFilter::advance(const ObservationWindow& window) {
+  set_clock(model_, survivors_.states, window.start);
   weigh_start(window);
   if (window.length() > 0) {
     grow(window);
@@ -127,6 +129,7 @@ void KlvFilter::grow(const ObservationWindow& window) {
   Weigher weigher(*this, window);
   grower_.grow(survivors_, window.length(), children_, failures_, &weigher);
   children_.time = window.end;
+  set_clock(model_, children_.states, window.end);
   current_ = &children_;
   statistics_.children += children_.size();
   statistics_.flow = flow_before_;

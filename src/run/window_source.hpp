@@ -1,6 +1,8 @@
 #pragma once
 /// Observation windows from a file, or from standard input row by row.
 #include <cstddef>
+#include <functional>
+#include <istream>
 #include <memory>
 #include <optional>
 #include <string>
@@ -8,7 +10,7 @@
 #include "wienertree/filter/window.hpp"
 #include "wienertree/numeric/state_archive.hpp"
 
-namespace wienertree::app {
+namespace wienertree {
 
 /// One window after the other.
 class WindowSource {
@@ -34,19 +36,27 @@ class WindowSource {
   virtual void exchange(StateArchive& archive) = 0;
 };
 
-/// "-" is standard input, where every row ends a window; else a file, cut into `steps` windows. Without
-/// `steps`: at least `usual_steps` where the rows allow it, no more than needed for one a row.
-/// `resumed`: its `exchange` will read, so that standard input may have no row to begin with.
-/// @throws InputError for a file that cannot be read, steps that do not fit it, or steps with standard input
+/// Outputs of a continuous record for which no steps are given, and steps at least of a discrete one.
 inline constexpr std::size_t usual_steps = 200;
 /// The steps of a record for which none are given.
 std::size_t default_steps(const ObservationRows& rows, ObservationKind kind);
-std::unique_ptr<WindowSource> open_windows(const std::string& observations, const Model& model,
-                                           std::optional<std::size_t> steps, bool resumed = false);
+
+/// A file, cut into `steps` windows; without `steps` into default_steps.
+/// @throws InputError for a file that cannot be read, or steps that do not fit it
+std::unique_ptr<WindowSource> open_windows(const std::string& file, const Model& model,
+                                           std::optional<std::size_t> steps);
 
 /// A record in memory, which must outlive what is returned, cut in the same way.
 /// @throws InputError for steps that do not fit it
 std::unique_ptr<WindowSource> cut_windows(ObservationRows rows, const Model& model,
                                           std::optional<std::size_t> steps);
 
-}  // namespace wienertree::app
+/// A stream, of which every row ends a window.
+/// @param origin names it in messages
+/// @param resumed its `exchange` will read, so that the stream may have no row to begin with
+/// @param interrupted whether a failure to read comes from an interruption, which is no error
+/// @throws InputError for a row that cannot be read
+std::unique_ptr<WindowSource> follow_windows(std::istream& in, const std::string& origin, const Model& model,
+                                             bool resumed, std::function<bool()> interrupted);
+
+}  // namespace wienertree

@@ -4,11 +4,11 @@
 #include <string>
 #include <string_view>
 
-namespace wienertree::app {
+namespace wienertree {
 
 /// CRC-64 of ECMA-182, reflected, as in the xz format.
 std::uint64_t checksum(std::string_view bytes);
 /// The same as 16 hexadecimal digits.
 std::string checksum_text(std::string_view bytes);
 
-}  // namespace wienertree::app
+}  // namespace wienertree

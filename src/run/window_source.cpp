@@ -1,4 +1,4 @@
-#include "window_source.hpp"
+#include "wienertree/run/window_source.hpp"
 
 #include <fmt/format.h>
 
@@ -8,10 +8,9 @@
 #include <limits>
 #include <vector>
 
-#include "checksum.hpp"
-#include "standard_input.hpp"
+#include "wienertree/run/checksum.hpp"
 
-namespace wienertree::app {
+namespace wienertree {
 namespace {
 
 class RecordedWindows final : public WindowSource {
@@ -60,14 +59,16 @@ class RecordedWindows final : public WindowSource {
 
 class StreamedWindows final : public WindowSource {
  public:
-  StreamedWindows(const Model& model, bool resumed)
+  StreamedWindows(std::istream& in, const std::string& origin, const Model& model, bool resumed,
+                  std::function<bool()> interrupted)
       : kind_(model.observation),
         timing_(model.timing),
-        stream_(&input_),
-        reader_(stream_, "standard input", model.observation_dimension(), model.observation),
+        origin_(origin),
+        interrupted_(std::move(interrupted)),
+        reader_(in, origin, model.observation_dimension(), model.observation),
         value_(model.observation_dimension()) {
     if (resumed) return;
-    if (!read_row()) throw InputError("no rows after the header", "standard input");
+    if (!read_row()) throw InputError("no rows after the header", origin_);
     start_ = time_;
     pair_.dimension = value_.size();
     pair_.append(time_, value_);
@@ -78,8 +79,8 @@ class StreamedWindows final : public WindowSource {
   bool next(ObservationWindow& window) override {
     if (steps_ == 0 && observed_at_start_) return get(window);
     if (!read_row()) {
-      if (rows_ == 1 && kind_ == ObservationKind::continuous && !input_.interrupted())
-        throw InputError("a continuous observation needs at least two rows", "standard input");
+      if (rows_ == 1 && kind_ == ObservationKind::continuous && !interrupted_())
+        throw InputError("a continuous observation needs at least two rows", origin_);
       return false;
     }
     if (pair_.rows() == 2) {
@@ -100,7 +101,7 @@ class StreamedWindows final : public WindowSource {
   std::size_t rows() const override { return rows_; }
   bool has_inner_rows() const override { return false; }
   bool streams() const override { return true; }
-  std::string identity() const override { return "standard input"; }
+  std::string identity() const override { return origin_; }
   void exchange(StateArchive& archive) override {
     archive(pair_.times, pair_.values, time_, start_, rows_, steps_, observed_at_start_);
     pair_.dimension = value_.size();
@@ -117,7 +118,7 @@ class StreamedWindows final : public WindowSource {
         if (!reader_.next(time, value_)) return false;
       } while (!(time > last));
     } catch (const InputError&) {
-      if (!input_.interrupted()) throw;
+      if (!interrupted_()) throw;
       return false;
     }
     time_ = time;
@@ -132,8 +133,8 @@ class StreamedWindows final : public WindowSource {
 
   ObservationKind kind_;
   ObservationTiming timing_;
-  StandardInput input_;
-  std::istream stream_;
+  std::string origin_;
+  std::function<bool()> interrupted_;
   ObservationReader reader_;
   std::vector<double> value_;
   ObservationPath pair_;
@@ -152,18 +153,12 @@ std::size_t default_steps(const ObservationRows& rows, ObservationKind kind) {
   return gaps * std::max<std::size_t>(1, gaps == 0 ? 1 : (usual_steps + gaps / 2) / gaps);
 }
 
-std::unique_ptr<WindowSource> open_windows(const std::string& observations, const Model& model,
-                                           std::optional<std::size_t> steps, bool resumed) {
-  if (observations != "-") {
-    auto path = std::make_unique<const ObservationPath>(
-        read_observations(observations, model.observation_dimension(), model.observation));
-    const ObservationRows rows = *path;
-    return std::make_unique<RecordedWindows>(rows, model, steps, std::move(path));
-  }
-  if (steps)
-    throw InputError("needs the whole record; with --observations - every row ends a step", "--steps",
-                     std::to_string(*steps));
-  return std::make_unique<StreamedWindows>(model, resumed);
+std::unique_ptr<WindowSource> open_windows(const std::string& file, const Model& model,
+                                           std::optional<std::size_t> steps) {
+  auto path = std::make_unique<const ObservationPath>(
+      read_observations(file, model.observation_dimension(), model.observation));
+  const ObservationRows rows = *path;
+  return std::make_unique<RecordedWindows>(rows, model, steps, std::move(path));
 }
 
 std::unique_ptr<WindowSource> cut_windows(ObservationRows rows, const Model& model,
@@ -171,4 +166,9 @@ std::unique_ptr<WindowSource> cut_windows(ObservationRows rows, const Model& mod
   return std::make_unique<RecordedWindows>(rows, model, steps);
 }
 
-}  // namespace wienertree::app
+std::unique_ptr<WindowSource> follow_windows(std::istream& in, const std::string& origin, const Model& model,
+                                             bool resumed, std::function<bool()> interrupted) {
+  return std::make_unique<StreamedWindows>(in, origin, model, resumed, std::move(interrupted));
+}
+
+}  // namespace wienertree

@@ -1,9 +1,9 @@
-#include "launches.hpp"
+#include "wienertree/run/launches.hpp"
 
 #include <algorithm>
 #include <cmath>
 
-namespace wienertree::app {
+namespace wienertree {
 namespace {
 
 // Average over the launches of one number of each.
@@ -116,4 +116,4 @@ FilterStatistics Launches::statistics() const {
   return all;
 }
 
-}  // namespace wienertree::app
+}  // namespace wienertree

@@ -1,10 +1,10 @@
-#include "checksum.hpp"
+#include "wienertree/run/checksum.hpp"
 
 #include <fmt/format.h>
 
 #include <boost/crc.hpp>
 
-namespace wienertree::app {
+namespace wienertree {
 
 std::uint64_t checksum(std::string_view bytes) {
   boost::crc_optimal<64, 0x42F0E1EBA9EA3693, 0xFFFFFFFFFFFFFFFF, 0xFFFFFFFFFFFFFFFF, true, true> crc;
@@ -14,4 +14,4 @@ std::uint64_t checksum(std::string_view bytes) {
 
 std::string checksum_text(std::string_view bytes) { return fmt::format("{:016x}", checksum(bytes)); }
 
-}  // namespace wienertree::app
+}  // namespace wienertree

@@ -5,10 +5,10 @@
 #include <span>
 #include <vector>
 
-#include "filter_arguments.hpp"
 #include "wienertree/filter/filter.hpp"
+#include "wienertree/run/recommended_options.hpp"
 
-namespace wienertree::app {
+namespace wienertree {
 
 /// What M launches say of one time.
 struct LaunchesSummary {
@@ -48,4 +48,4 @@ class Launches {
   std::vector<PosteriorSummary> summaries_;
 };
 
-}  // namespace wienertree::app
+}  // namespace wienertree
