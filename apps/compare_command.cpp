@@ -29,6 +29,7 @@ struct CompareArguments {
   std::optional<std::string> observations, output, plot;
   std::optional<TableFormat> format;
   std::optional<std::uint64_t> steps;
+  AccuracyArguments accuracy;
   CheckpointArguments saving;
   bool quiet = false;
 };
@@ -78,30 +79,32 @@ std::vector<Contender> contenders(const CompareArguments& a) {
   return all;
 }
 
-std::vector<std::string> columns(const std::vector<Contender>& all, bool several_launches) {
+std::vector<std::string> columns(const std::vector<Contender>& all, bool several_launches, bool errors) {
   std::vector<std::string> names = {"t"};
   const auto add = [&](const char* prefix, std::size_t first) {
     for (std::size_t m = first; m < all.size(); ++m) names.push_back(fmt::format("{}_{}", prefix, m + 1));
   };
   add("log_evidence", 0);
   if (several_launches) add("se_log_evidence", 0);
+  if (errors) add("error_log_evidence", 0);
   add("log_bayes_factor", 1);
   add("probability", 0);
   return names;
 }
 
-std::vector<double> row_of(const ComparisonRow& r, bool several_launches) {
+std::vector<double> row_of(const ComparisonRow& r, bool several_launches, bool errors) {
   std::vector<double> row = {r.time};
   row.insert(row.end(), r.log_evidence.begin(), r.log_evidence.end());
   if (several_launches) row.insert(row.end(), r.standard_error.begin(), r.standard_error.end());
+  if (errors) row.insert(row.end(), r.error.begin(), r.error.end());
   for (std::size_t m = 1; m < r.log_evidence.size(); ++m) row.push_back(r.log_bayes_factor(m));
   const std::vector<double> p = r.probabilities();
   row.insert(row.end(), p.begin(), p.end());
   return row;
 }
 
-Json report_of(const CompareArguments& a, const std::vector<Contender>& all,
-               const std::vector<ComparisonRow>& rows) {
+Json report_of(const CompareArguments& a, const std::vector<Contender>& all, const Comparison& comparison) {
+  const std::vector<ComparisonRow>& rows = comparison.rows;
   Json report;
   report["program"] = "wienertree";
   report["version"] = WIENERTREE_VERSION;
@@ -112,49 +115,64 @@ Json report_of(const CompareArguments& a, const std::vector<Contender>& all,
     Json model;
     model["model"] = all[m].label;
     for (const auto& [name, value] : all[m].model.parameters) model["parameters"][name] = value;
-    model["options"] = options_in_force(all[m].setup, all[m].model);
+    model["options"] = options_in_force(comparison.setup[m], all[m].model);
     model["log_evidence"] = rows.back().log_evidence[m];
     if (all[m].setup.launches > 1) model["standard_error"] = rows.back().standard_error[m];
+    if (std::isfinite(comparison.error[m])) model["error_log_evidence"] = comparison.error[m];
+    if (!comparison.warnings[m].empty()) model["warnings"] = comparison.warnings[m];
     model["probability"] = p[m];
     report["models"].push_back(std::move(model));
   }
   return report;
 }
 
+// A sentence for each model whose difference from the first is not above the errors of both.
+std::vector<std::string> undecided(const std::vector<Contender>& all, const Comparison& comparison) {
+  std::vector<std::string> sentences;
+  const std::vector<double>& l = comparison.rows.back().log_evidence;
+  for (std::size_t m = 1; m < all.size(); ++m)
+    if (comparison.undecided(0, m))
+      sentences.push_back(fmt::format(
+          "the log evidences of {} and {} differ by {:.2g}, and their errors may be {:.2g}: no preference "
+          "can be told",
+          all.front().label, all[m].label, std::abs(l[m] - l[0]), comparison.error[0] + comparison.error[m]));
+  return sentences;
+}
+
 std::string summary_of(const CompareArguments& a, const std::vector<Contender>& all,
-                       const std::vector<ComparisonRow>& rows) {
+                       const Comparison& comparison) {
+  const std::vector<ComparisonRow>& rows = comparison.rows;
   const ComparisonRow& last = rows.back();
   std::size_t width = 5;
   for (const Contender& c : all) width = std::max(width, c.label.size());
   std::string text = fmt::format("{}, t = {:g} .. {:g}\n", *a.observations, rows.front().time, last.time);
   // A formula that depends on the number of Brownian motions or a default on the dimension may differ.
   std::string before;
-  for (const Contender& c : all) {
-    const std::string setup = describe(c.setup);
-    if (setup != before) text += fmt::format("  {}{}\n", before.empty() ? "" : c.label + ": ", setup);
+  for (std::size_t m = 0; m < all.size(); ++m) {
+    const std::string setup = describe(comparison.setup[m]);
+    if (setup != before) text += fmt::format("  {}{}\n", before.empty() ? "" : all[m].label + ": ", setup);
     before = setup;
   }
-  text += fmt::format("\n  {:<{}} {:>16} {:>12} {:>20} {:>12}\n", "model", width, "log evidence",
-                      "std. error", "log Bayes factor", "probability");
+  text += fmt::format("\n  {:<{}} {:>16} {:>12} {:>20} {:>12}\n", "model", width, "log evidence", "error",
+                      "log Bayes factor", "probability");
   const std::vector<double> p = last.probabilities();
   for (std::size_t m = 0; m < all.size(); ++m) {
-    const std::string error = all[m].setup.launches > 1 ? fmt::format("{:.2g}", last.standard_error[m])
-                              : all[m].setup.random     ? "?"
-                                                        : "-";
+    const std::string error =
+        std::isfinite(comparison.error[m]) ? fmt::format("{:.2g}", comparison.error[m]) : "?";
     text +=
         fmt::format("  {:<{}} {:>16.6f} {:>12} {:>20} {:>12.4g}\n", all[m].label, width, last.log_evidence[m],
                     error, m == 0 ? "" : fmt::format("{:.6f}", last.log_bayes_factor(m)), p[m]);
   }
-  text += "\n  Bayes factors are against the first model; probabilities from equal ones before.\n";
-  if (all.front().setup.random && all.front().setup.launches == 1)
-    text += "  One launch of a random method tells no error: give --launches.\n";
-  return text;
+  return text + "\n  Bayes factors are against the first model; probabilities from equal ones before.\n";
 }
 
 // Everything the table depends on.
-Json identity_of(const std::vector<Contender>& all, const WindowSource& windows) {
+Json identity_of(const std::vector<Contender>& all, const WindowSource& windows,
+                 const ControlOptions& control) {
   Json run = run_identity("compare");
   run["observations"] = windows.identity();
+  run["tolerance"] = control.tolerance;
+  run["work"] = control.work;
   for (const Contender& c : all) {
     Json model = model_identity(c.file, c.model);
     model["label"] = c.label;
@@ -178,18 +196,27 @@ void compare_and_write(const CompareArguments& a) {
   OutputFile output("--output", a.output.value_or("-"));
   std::vector<std::unique_ptr<WindowSource>> windows;
   for (const Contender& c : all) windows.push_back(windows_of(*a.observations, c.model, a.steps));
-  SavedRun saved(a.saving, identity_of(all, *windows.front()));
-  const std::vector<ComparisonRow> rows = compare(all, windows, !a.quiet, saved);
-  const bool several = all.front().setup.launches > 1;
-  Table table{columns(all, several), {}};
-  for (const ComparisonRow& row : rows) table.rows.push_back(row_of(row, several));
+  const ControlOptions control = control_options(a.accuracy, a.filter, a.steps, {});
+  std::vector<ObservationRows> records;
+  for (const auto& source : windows) records.push_back(*source->record());
+  SavedRun saved(a.saving, identity_of(all, *windows.front(), control));
+  const Comparison comparison = compare(all, control, records, !a.quiet, saved);
+  const std::vector<ComparisonRow>& rows = comparison.rows;
+  const bool several = all.front().setup.launches > 1, errors = a.accuracy.errors;
+  Table table{columns(all, several, errors), {}};
+  for (const ComparisonRow& row : rows) table.rows.push_back(row_of(row, several, errors));
   output.stage(a.format.value_or(TableFormat::csv) == TableFormat::csv
                    ? to_csv(table)
-                   : to_json(report_of(a, all, rows), table));
+                   : to_json(report_of(a, all, comparison), table));
   if (plot) plot->stage(draw_comparison(*picture, all, rows));
   output.publish();
   if (plot) plot->publish();
-  if (!a.quiet) std::fputs(summary_of(a, all, rows).c_str(), stderr);
+  for (std::size_t m = 0; m < all.size(); ++m)
+    for (const std::string& text : comparison.warnings[m])
+      std::fputs(fmt::format("warning: {}: {}\n", all[m].label, text).c_str(), stderr);
+  for (const std::string& text : undecided(all, comparison))
+    std::fputs(fmt::format("warning: {}\n", text).c_str(), stderr);
+  if (!a.quiet) std::fputs(summary_of(a, all, comparison).c_str(), stderr);
 }
 
 }  // namespace
@@ -204,6 +231,8 @@ void add_compare_command(CLI::App& program) {
   add_record_steps(app, a->steps);
   add_filter_options(app, a->filter);
   add_assignments(app, a->parameters);
+  add_accuracy_options(app, a->accuracy);
+  app.add_flag("--errors", a->accuracy.errors, "Columns with estimates of the errors of the log evidences");
   add_text(app, "--output", a->output, "FILE", "Where the table goes [standard output]");
   add_choice(app, "--format", a->format, formats, "Of the table [csv]");
   add_text(app, "--plot", a->plot, "FILE",

@@ -6,23 +6,8 @@
 
 #include "progress.hpp"
 #include "wienertree/run/launches.hpp"
-#include "wienertree/run/window_source.hpp"
 
 namespace wienertree::app {
-namespace {
-
-// The error of the logarithm of an average of M: sd(Z)/(mean(Z) sqrt(M)), from the launches' Z relative to
-// their mean.
-double standard_error(const std::vector<double>& log_evidence, double log_mean) {
-  const auto M = static_cast<double>(log_evidence.size());
-  if (log_evidence.size() < 2) return 0;
-  double squares = 0;
-  for (const double l : log_evidence) squares += std::pow(std::expm1(l - log_mean), 2);
-  return std::sqrt(squares / (M - 1) / M);
-}
-
-}  // namespace
-
 std::vector<double> ComparisonRow::probabilities() const {
   const double all = log_average(log_evidence) + std::log(static_cast<double>(log_evidence.size()));
   std::vector<double> p;
@@ -30,47 +15,52 @@ std::vector<double> ComparisonRow::probabilities() const {
   return p;
 }
 
-std::vector<ComparisonRow> compare(const std::vector<Contender>& contenders,
-                                   const std::vector<std::unique_ptr<WindowSource>>& windows,
-                                   bool show_progress, SavedRun& saved) {
-  const std::size_t models = contenders.size(), steps = windows.front()->size();
-  const bool starts_before = !windows.front()->observed_at_start();
-  const std::vector<double> zeros(models, 0.0);
-  std::vector<ComparisonRow> rows;
-  if (starts_before) rows.push_back({windows.front()->start(), zeros, zeros});
-  const std::size_t first = rows.size();
-  std::vector<Launches> filters;
-  for (std::size_t m = 0; m < models; ++m) {
-    refuse_oversized_tree(contenders[m].model, contenders[m].setup.options, windows[m]->size());
-    filters.emplace_back(contenders[m].model, contenders[m].setup);
-  }
+bool Comparison::undecided(std::size_t first, std::size_t second) const {
+  const std::vector<double>& l = rows.back().log_evidence;
+  return !(std::abs(l[first] - l[second]) > error[first] + error[second]);
+}
+
+Comparison compare(const std::vector<Contender>& contenders, const ControlOptions& control,
+                   const std::vector<ObservationRows>& records, bool show_progress, SavedRun& saved) {
+  const std::size_t models = contenders.size();
+  std::vector<ControlledFilter> filters;
+  for (std::size_t m = 0; m < models; ++m)
+    filters.emplace_back(contenders[m].model, contenders[m].setup, control, records[m]);
   const Exchange exchange = [&](StateArchive& archive) {
-    archive(rows);
-    for (std::size_t m = 0; m < models; ++m) {
-      windows[m]->exchange(archive);
-      filters[m].exchange(archive);
-    }
+    for (ControlledFilter& filter : filters) filter.exchange(archive);
   };
   saved.resume(exchange);
-  Progress progress("compare", steps, show_progress);
-  while (rows.size() - first < steps && !saved.interrupted()) {
-    for (std::size_t m = 0; m < models; ++m) {
-      ObservationWindow window;
-      const bool there = windows[m]->next(window);
-      if (m == 0) rows.push_back({window.end, zeros, zeros});
-      if (!there || rows.back().time != window.end)
-        throw InputError("steps to other times than the first model: their timing differs",
-                         "model " + contenders[m].label, fmt::format("t = {:g}", rows.back().time));
-      filters[m].advance(window);
-      const std::vector<double> log_evidence = filters[m].log_evidences();
-      rows.back().log_evidence[m] = log_average(log_evidence);
-      rows.back().standard_error[m] = standard_error(log_evidence, rows.back().log_evidence[m]);
-    }
-    progress.advance_to(rows.size() - first);
-    saved.after_step(exchange);
+  double time = 0;
+  {
+    Progress progress("compare", 0, show_progress);
+    std::size_t done = 0;
+    for (ControlledFilter& filter : filters)
+      while (!saved.interrupted() && filter.advance()) {
+        time = filter.time();
+        progress.advance_to(++done);
+        saved.after_step(exchange);
+      }
   }
-  saved.finish(exchange, fmt::format("t = {:g}", rows.back().time));
-  return rows;
+  saved.finish(exchange, fmt::format("t = {:g}", time));
+  Comparison result;
+  for (const LaunchesSummary& row : filters.front().answer().rows)
+    result.rows.push_back({row.mean.time, {}, {}, {}});
+  for (std::size_t m = 0; m < models; ++m) {
+    const std::vector<LaunchesSummary>& rows = filters[m].answer().rows;
+    const Accuracy accuracy = filters[m].accuracy();
+    for (std::size_t r = 0; r < result.rows.size(); ++r) {
+      if (r >= rows.size() || rows[r].mean.time != result.rows[r].time)
+        throw InputError("has rows at other times than the first model: their timing differs",
+                         "model " + contenders[m].label, fmt::format("t = {:g}", result.rows[r].time));
+      result.rows[r].log_evidence.push_back(rows[r].mean.log_evidence);
+      result.rows[r].standard_error.push_back(rows[r].log_evidence_error);
+      result.rows[r].error.push_back(accuracy.rows[r].log_evidence);
+    }
+    result.setup.push_back(filters[m].answer_setup());
+    result.warnings.push_back(filters[m].warnings());
+    result.error.push_back(accuracy.known ? accuracy.error.log_evidence : INFINITY);
+  }
+  return result;
 }
 
 }  // namespace wienertree::app

@@ -151,6 +151,25 @@ void add_record_steps(CLI::App& app, std::optional<std::uint64_t>& steps) {
             1'000'000'000);
 }
 
+void add_accuracy_options(CLI::App& app, AccuracyArguments& a) {
+  add_number(app, "--tolerance", a.tolerance, Sign::positive,
+             "Largest error wanted, in posterior standard deviations; of the log evidence as it is [0.02]");
+  add_number(app, "--work", a.work, Sign::positive,
+             "Node-steps that the search for it may take [4e8, about 45 s of one core]");
+}
+
+ControlOptions control_options(const AccuracyArguments& accuracy, const FilterArguments& filter,
+                               std::optional<std::uint64_t> steps, std::optional<std::uint64_t> moments) {
+  ControlOptions control;
+  control.tolerance = accuracy.tolerance.value_or(control.tolerance);
+  control.work = accuracy.work.value_or(control.work);
+  control.highest_moment = moments.value_or(0);
+  if (steps) control.steps = *steps;
+  control.nodes_given = filter.nodes.has_value();
+  control.formulas = formulas_directory();
+  return control;
+}
+
 void add_moments(CLI::App& app, std::optional<std::uint64_t>& moments) {
   add_count(app, "--moments", moments, 2, "Also the raw moments E[x^2] .. E[x^K]", 20);
 }

@@ -6,6 +6,7 @@
 
 #include "command_line.hpp"
 #include "table.hpp"
+#include "wienertree/run/controlled_filter.hpp"
 #include "wienertree/run/recommended_options.hpp"
 
 namespace wienertree::app {
@@ -23,6 +24,16 @@ void add_filter_options(CLI::App& app, FilterArguments& arguments);
 /// Into how many steps a record is cut, and the moments that are reported.
 void add_record_steps(CLI::App& app, std::optional<std::uint64_t>& steps);
 void add_moments(CLI::App& app, std::optional<std::uint64_t>& moments);
+
+/// How exact the answer is to be.
+struct AccuracyArguments {
+  std::optional<double> tolerance, work;
+  bool errors = false;
+};
+void add_accuracy_options(CLI::App& app, AccuracyArguments& arguments);
+/// What the library's control goes by.
+ControlOptions control_options(const AccuracyArguments& accuracy, const FilterArguments& filter,
+                               std::optional<std::uint64_t> steps, std::optional<std::uint64_t> moments);
 
 /// Loads the formula; what was not given is as recommended_options says.
 /// @throws InputError for an option that does not apply to the method, the model or another option, and when

@@ -30,6 +30,7 @@ struct FilterCommandArguments {
   std::optional<TableFormat> format;
   std::optional<std::uint64_t> moments, steps;
   std::optional<double> density_at;
+  AccuracyArguments accuracy;
   CheckpointArguments saving;
   bool quiet = false;
 };
@@ -56,7 +57,7 @@ Band band_of(const std::vector<std::vector<double>>& rows, std::size_t state, st
 std::string draw(Picture picture, const FilterContext& c, const FilterRun& run,
                  const std::optional<ObservationPath>& signal) {
   const std::string what =
-      fmt::format("{}: {}, {} steps", c.model.name, describe(c.setup), run.statistics.steps);
+      fmt::format("{}: {}, {} steps", c.model.name, describe(run.setup), run.statistics.steps);
   if (!run.density.empty()) {
     std::vector<DensityPanel> panels = run.density;
     for (std::size_t i = 0; i < panels.size(); ++i)
@@ -82,6 +83,8 @@ Json identity_of(const FilterCommandArguments& a, const FilterContext& c, bool f
   if (!c.setup.options.formula.paths.empty())
     run["formula's checksum"] = checksum_text(format_formula(c.setup.options.formula));
   run["moments"] = c.highest_moment;
+  run["tolerance"] = c.control.tolerance;
+  run["work"] = c.control.work;
   if (a.density_at) run["density-at"] = *a.density_at;
   // What is kept of the rows.
   run["with --plot"] = a.plot.has_value();
@@ -111,23 +114,26 @@ void filter_and_write(const FilterCommandArguments& a) {
   const auto windows = windows_of(*a.observations, model, a.steps, a.saving.resume.has_value());
 
   const int highest_moment = static_cast<int>(a.moments.value_or(0));
-  const FilterContext context{model, setup, *windows, *a.observations, highest_moment};
+  const ControlOptions control = control_options(a.accuracy, a.filter, a.steps, a.moments);
+  const FilterContext context{model, setup, *windows, *a.observations, highest_moment, control};
   const bool csv = a.format.value_or(TableFormat::csv) == TableFormat::csv;
   // Rows go out as they come only where they come one by one; a file appears when it is whole.
   const bool follow = windows->streams() && csv && output.target() == "-";
   FilterRequest request;
-  request.highest_moment = highest_moment;
   request.density_at = a.density_at;
   request.progress = !a.quiet;
   request.keep_rows = !follow || a.plot;
   request.keep_exact_rows = a.plot.has_value();
+  request.errors = a.accuracy.errors;
   SavedRun saved(a.saving, identity_of(a, context, follow));
-  const std::vector<std::string> columns = filter_columns(model, setup, highest_moment);
+  const std::vector<std::string> columns = filter_columns(model, setup, highest_moment, a.accuracy.errors);
   if (follow) {
     if (!saved.resumes()) write_to_stdout(csv_header(columns));
     request.observe = [](const std::vector<double>& row) { write_to_stdout(csv_row(row)); };
   }
-  FilterRun run = run_filter(model, setup, *windows, request, saved);
+  const std::optional<ObservationRows> record = windows->record();
+  FilterRun run = record ? filter_record(model, setup, control, *record, request, saved)
+                         : filter_stream(model, setup, control, *windows, request, saved);
   if (plot) plot->stage(draw(*picture, context, run, signal));
   if (!follow) {
     const Table table{columns, std::move(run.rows)};
@@ -137,6 +143,7 @@ void filter_and_write(const FilterCommandArguments& a) {
   if (plot) plot->publish();
   // Nodes are never left out without a word.
   if (a.quiet && run.statistics.dropped_nodes > 0) std::fputs(dropped_line(run).c_str(), stderr);
+  for (const std::string& text : run.warnings) std::fputs(fmt::format("warning: {}\n", text).c_str(), stderr);
   if (a.quiet) return;
   const std::chrono::duration<double> took = std::chrono::steady_clock::now() - began;
   std::fputs(filter_summary(context, run, took.count()).c_str(), stderr);
@@ -158,6 +165,8 @@ void add_filter_command(CLI::App& program) {
   add_text(app, "--output", a->output, "FILE", "Where the table goes [standard output]");
   add_choice(app, "--format", a->format, formats, "Of the table [csv]");
   add_moments(app, a->moments);
+  add_accuracy_options(app, a->accuracy);
+  app.add_flag("--errors", a->accuracy.errors, "Columns with estimates of the errors of each row");
   add_text(app, "--plot", a->plot, "FILE", "A picture of mean and 5-95 % band, .svg or .png");
   add_number(app, "--density-at", a->density_at, Sign::any, "Draw the law at this time instead");
   add_text(app, "--signal", a->signal, "FILE", "The true signal (CSV t,<state>,..), to be drawn as well");

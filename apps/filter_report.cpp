@@ -13,9 +13,9 @@ namespace wienertree::app {
 namespace {
 
 // The functional that the data allowed.
-std::string functional_in_force(const FilterContext& c) {
-  const std::string asked = options_in_force(c.setup, c.model).value("functional", "");
-  return asked == "second-order" && !c.windows.has_inner_rows() ? "trapezoid" : asked;
+std::string functional_in_force(const FilterContext& c, const FilterRun& run) {
+  const std::string asked = options_in_force(run.setup, c.model).value("functional", "");
+  return asked == "second-order" && run.statistics.steps + 1 >= c.windows.rows() ? "trapezoid" : asked;
 }
 
 std::string line_of_numbers(const std::string& name, std::span<const double> numbers) {
@@ -29,17 +29,16 @@ std::vector<double> final_numbers(const PosteriorSummary& s, std::size_t i) {
 }
 
 std::string what_was_run(const FilterContext& c, const FilterRun& run) {
-  std::string text =
-      fmt::format("{} on {}, {}, {} rows, t = {:g} .. {:g}, {} steps\n", describe(c.setup), c.model.name,
-                  c.observations == "-" ? "standard input" : c.observations, c.windows.rows(),
-                  c.windows.start(), run.last.mean.time, run.statistics.steps);
+  std::string text = fmt::format("{} on {}, {}, {} rows, t = {:g} .. {:g}, {} steps\n", describe(run.setup),
+                                 c.model.name, c.observations == "-" ? "standard input" : c.observations,
+                                 c.windows.rows(), run.start, run.last.mean.time, run.statistics.steps);
   std::string separator = "  ";
-  const Json options = options_in_force(c.setup, c.model);
+  const Json options = options_in_force(run.setup, c.model);
   for (const auto& [name, value] : options.items()) {
     const std::string shown = value.is_string() ? value.get<std::string>() : value.dump();
     text += fmt::format("{}{} {}", separator, name, shown);
-    if (name == "functional" && functional_in_force(c) != shown)
-      text += fmt::format(" (as {}: no rows inside the steps)", functional_in_force(c));
+    if (name == "functional" && functional_in_force(c, run) != shown)
+      text += fmt::format(" (as {}: no rows inside the steps)", functional_in_force(c, run));
     separator = ", ";
   }
   return text + '\n';
@@ -71,6 +70,15 @@ std::string evidence_line(const FilterContext& c, const FilterRun& run) {
     text += fmt::format(", exact {:.6f}, difference {:.2g}", run.exact->log_evidence,
                         last.mean.log_evidence - run.exact->log_evidence);
   return text + '\n';
+}
+
+std::string error_line(const FilterRun& run) {
+  if (!run.error_known) return "  errors: not known\n";
+  return fmt::format(
+      "  errors at most about {:.1e} in means, {:.1e} in standard deviations, {:.1e} in quantiles (in "
+      "posterior "
+      "standard deviations), {:.1e} in log evidence\n",
+      run.error.mean, run.error.sd, run.error.quantile, run.error.log_evidence);
 }
 
 std::string ratio_lines(const FilterRun& run) {
@@ -117,14 +125,23 @@ Json filter_report(const FilterContext& c, const FilterRun& run) {
   for (const auto& [name, value] : c.model.parameters) report["parameters"][name] = value;
   report["observations"] = c.observations;
   report["rows_read"] = c.windows.rows();
-  Json options = options_in_force(c.setup, c.model);
+  Json options = options_in_force(run.setup, c.model);
   options["steps"] = run.statistics.steps;
+  options["tolerance"] = c.control.tolerance;
+  options["work"] = c.control.work;
   if (c.highest_moment > 0) options["moments"] = c.highest_moment;
   report["options"] = std::move(options);
   if (c.model.observation == ObservationKind::continuous && keeps_nodes(c.setup.options.method))
-    report["functional_in_force"] = functional_in_force(c);
+    report["functional_in_force"] = functional_in_force(c, run);
   report["children"] = run.statistics.children;
   report["ode_solves"] = run.statistics.flow.node_segments;
+  if (run.error_known) {
+    report["error_mean"] = run.error.mean;
+    report["error_sd"] = run.error.sd;
+    report["error_quantile"] = run.error.quantile;
+    report["error_log_evidence"] = run.error.log_evidence;
+  }
+  if (!run.warnings.empty()) report["warnings"] = run.warnings;
   report["dropped_nodes"] = run.statistics.dropped_nodes;
   if (recombines(c.setup.options.thinning.method)) report["discarded"] = run.statistics.discarded;
   if (!run.exact) return report;
@@ -146,7 +163,7 @@ std::string dropped_line(const FilterRun& run) {
 
 std::string filter_summary(const FilterContext& context, const FilterRun& run, double seconds) {
   return what_was_run(context, run) + final_posterior(context, run) + evidence_line(context, run) +
-         ratio_lines(run) + work_line(context, run, seconds);
+         error_line(run) + ratio_lines(run) + work_line(context, run, seconds);
 }
 
 }  // namespace wienertree::app

@@ -14,6 +14,7 @@ struct FilterContext {
   const WindowSource& windows;
   std::string observations;  ///< as given
   int highest_moment;
+  const ControlOptions& control;
 };
 
 /// Version, model with its parameters, every option in force (but --threads, which changes no result), and

@@ -8,7 +8,8 @@ std::span<const std::string> states_of(const Model& model) {
   return {model.state_names.data(), model.reported_dimension()};
 }
 
-std::vector<std::string> filter_columns(const Model& model, const FilterSetup& setup, int highest_moment) {
+std::vector<std::string> filter_columns(const Model& model, const FilterSetup& setup, int highest_moment,
+                                        bool errors) {
   std::vector<std::string> columns = {"t"};
   for (const char* prefix : {"mean_", "sd_"})
     for (const std::string& state : states_of(model)) columns.push_back(prefix + state);
@@ -19,9 +20,13 @@ std::vector<std::string> filter_columns(const Model& model, const FilterSetup& s
     for (const std::string& state : states_of(model)) columns.push_back(fmt::format("m{}_{}", k, state));
   if (setup.options.method == FilterMethod::weighted)
     for (const char* name : {"log_bayes_factor", "log_variance"}) columns.emplace_back(name);
-  if (setup.launches == 1) return columns;
-  for (const std::string& state : states_of(model)) columns.push_back("mc_sd_" + state);
-  columns.emplace_back("mc_sd_log_evidence");
+  if (setup.launches > 1) {
+    for (const std::string& state : states_of(model)) columns.push_back("mc_sd_" + state);
+    columns.emplace_back("mc_sd_log_evidence");
+  }
+  if (errors)
+    for (const char* name : {"error_mean", "error_sd", "error_quantile", "error_log_evidence"})
+      columns.emplace_back(name);
   return columns;
 }
 
@@ -39,6 +44,10 @@ std::vector<double> filter_row(const LaunchesSummary& summary, bool several_laun
   row.insert(row.end(), summary.mean_sd.begin(), summary.mean_sd.end());
   row.push_back(summary.log_evidence_sd);
   return row;
+}
+
+void append(std::vector<double>& row, const AnswerError& e) {
+  row.insert(row.end(), {e.mean, e.sd, e.quantile, e.log_evidence});
 }
 
 }  // namespace wienertree::app

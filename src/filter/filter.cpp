@@ -93,10 +93,17 @@ void exchange(StateArchive& archive, LikelihoodRatio& ratio) {
   archive(ratio.log_mean, ratio.log_variance, ratio.effective_size);
 }
 
-void Filter::exchange(StateArchive& archive) {
-  FilterStatistics& s = statistics_;
+void exchange(StateArchive& archive, FilterStatistics& s) {
   archive(s.flow.node_segments, s.flow.field_evaluations, s.flow.cvode_nodes, s.steps, s.children,
           s.dropped_nodes, s.discarded);
+}
+
+void exchange(StateArchive& archive, FilterWarning& warning) {
+  archive(warning.kind, warning.time, warning.text);
+}
+
+void Filter::exchange(StateArchive& archive) {
+  archive(statistics_, warnings_);
   exchange_state(archive);
 }
 

@@ -30,6 +30,8 @@ struct FilterStatistics {
   double discarded = 0;             ///< sum of Selection::discarded over the steps
 };
 
+void exchange(StateArchive& archive, FilterStatistics& statistics);
+
 /// Of a filter that compares the model with noise alone: what its particles' likelihood ratios L say.
 struct LikelihoodRatio {
   double log_mean = 0;  ///< log of the mean of L: the log Bayes factor of the model against noise

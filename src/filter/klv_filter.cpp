@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "wienertree/filter/clock.hpp"
+#include "wienertree/filter/node_warnings.hpp"
 #include "wienertree/filter/places.hpp"
 #include "wienertree/numeric/log_weights.hpp"
 #include "wienertree/tree/initial.hpp"
@@ -67,6 +68,7 @@ class KlvFilter::Weigher final : public FamilyVisitor {
     s.term.resize(w.size());
     model_.density->log_density(window_.observation, x, s.term);
     for (std::size_t n = 0; n < w.size(); ++n) w[n] += s.term[n];
+    s.best_term = std::max(s.best_term, *std::ranges::max_element(s.term));
   }
 
   KlvFilter& filter_;
@@ -86,6 +88,7 @@ KlvFilter::KlvFilter(const Model& model, const FilterOptions& options)
       current_(&survivors_),
       scratch_(options_.threads) {
   if (carries_likelihood()) survivors_.log_likelihood.assign(survivors_.size(), 0.0);
+  warn_of_model(model_, warnings_);
 }
 
 std::string_view KlvFilter::name() const { return thinning_ ? "klv" : "full-tree"; }
@@ -120,6 +123,8 @@ void KlvFilter::weigh_start(const ObservationWindow& window) {
     start_term_.resize(survivors_.size());
     model_.density->log_density(window.observation, survivors_.states, start_term_);
     for (std::size_t n = 0; n < survivors_.size(); ++n) weight[n] += start_term_[n];
+    warn_of_reach(model_, window.observation, *std::ranges::max_element(start_term_), window.start,
+                  warnings_);
     current_ = &survivors_;
   }
   if (!(window.length() > 0)) check_log_weights(weight, window);
@@ -127,6 +132,7 @@ void KlvFilter::weigh_start(const ObservationWindow& window) {
 
 void KlvFilter::grow(const ObservationWindow& window) {
   Weigher weigher(*this, window);
+  for (Scratch& s : scratch_) s.best_term = -std::numeric_limits<double>::infinity();
   grower_.grow(survivors_, window.length(), children_, failures_, &weigher);
   children_.time = window.end;
   set_clock(model_, children_.states, window.end);
@@ -137,6 +143,14 @@ void KlvFilter::grow(const ObservationWindow& window) {
   const bool intact = failures_.empty();
   if (!intact) handle_failures(window);
   if (!intact || !weigher.passed()) check_log_weights(likelihood_of(children_), window);
+  if (model_.observation == ObservationKind::discrete && !window.at_start && !window.observation.empty()) {
+    double best = -std::numeric_limits<double>::infinity();
+    for (const Scratch& s : scratch_) best = std::max(best, s.best_term);
+    warn_of_reach(model_, window.observation, best, window.end, warnings_);
+  }
+  const auto heaviest = std::ranges::max_element(survivors_.log_weight) - survivors_.log_weight.begin();
+  warn_of_step(model_, std::as_const(survivors_.states).view().nodes(static_cast<std::size_t>(heaviest), 1),
+               window.length(), window.start, warnings_);
 }
 
 void KlvFilter::handle_failures(const ObservationWindow& window) {
@@ -199,6 +213,7 @@ void KlvFilter::exchange_state(StateArchive& archive) {
 }
 
 const Posterior& KlvFilter::posterior() {
+  const bool fresh = stale_;
   if (stale_) normalised_.assign(current_->log_weight, current_->log_likelihood, statistics_.steps, time_);
   stale_ = false;
   posterior_.time = time_;
@@ -207,6 +222,8 @@ const Posterior& KlvFilter::posterior() {
   posterior_.weight = normalised_.weight;
   posterior_.parents = current_ == &children_ ? children_.size() / options_.formula.paths.size() : 0;
   posterior_.kept = survivors_.size();
+  if (fresh && model_.observation != ObservationKind::none)
+    warn_of_law(model_, posterior_, normalised_.effective_size, warnings_);
   return posterior_;
 }
 

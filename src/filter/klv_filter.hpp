@@ -26,6 +26,7 @@ class KlvFilter final : public Filter {
   struct Scratch {
     Batch sensor, derivative, end_sensor;
     std::vector<double> term;
+    double best_term = 0;  ///< the largest log-density of the observation that the thread has seen
   };
 
   void weigh_start(const ObservationWindow& window);

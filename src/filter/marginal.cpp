@@ -14,8 +14,24 @@ namespace wienertree {
 namespace {
 
 constexpr std::size_t most_gaussians = 512;
+static const double kernel_width = getenv("KW") ? atof(getenv("KW")) : 0.35;
+
+// With z = (x - m)/s and rho = h^2/s^2, the operator of the header applied to N(m, s^2) (D^k phi = (-1)^k He_k phi):
+// its density is phi(z)/s times this,
+double density_factor(double z, double rho) {
+  const double q = z * z;
+  return 1 - rho / 2 * (q - 1) + rho * rho / 8 * (q * q - 6 * q + 3) -
+         rho * rho * rho / 48 * (q * q * q - 15 * q * q + 45 * q - 15);
+}
+
+// and its distribution function is Phi(z) plus phi(z) times this.
+double distribution_term(double z, double rho) {
+  const double q = z * z;
+  return z * (rho / 2 - rho * rho / 8 * (q - 3) + rho * rho * rho / 48 * (q * q - 10 * q + 15));
+}
 
 double normal_distribution(double z) { return 0.5 * std::erfc(-z / std::numbers::sqrt2); }
+double normal_density(double z) { return std::exp(-z * z / 2) / std::sqrt(2 * std::numbers::pi); }
 
 struct Atom {
   double x, weight;
@@ -145,7 +161,38 @@ Marginal::Marginal(const Posterior& posterior, std::size_t i)
     gaussians_.push_back({f.weight, f.mean, std::sqrt(f.variance)});
     if (!(f.variance > 0)) points += f.weight;
   }
-  has_density_ = !gaussians_.empty() && points < 1e-12;
+  if (posterior.dirac()) smooth();
+  has_density_ = !gaussians_.empty() && (points < 1e-12 || gaussians_.front().kernel > 0);
+}
+
+void Marginal::smooth() {
+  lowest_ = INFINITY, highest_ = -INFINITY;
+  for (std::size_t n = 0; n < atoms_.size(); ++n) {
+    if (!(weight_[n] > 0)) continue;
+    lowest_ = std::min(lowest_, atoms_[n]);
+    highest_ = std::max(highest_, atoms_[n]);
+  }
+  std::vector<Gaussian> sorted = gaussians_;
+  std::ranges::sort(sorted, {}, &Gaussian::mean);
+  double mean = 0, variance = 0;
+  for (const Gaussian& g : sorted) mean += g.weight * g.mean;
+  for (const Gaussian& g : sorted) variance += g.weight * ((g.mean - mean) * (g.mean - mean) + g.sd * g.sd);
+  // Of a Gaussian, 1/5 of the mass lies within 0.2533 standard deviations.
+  constexpr double part = 0.2, width_of_part = 2 * 0.2533471031357997;
+  double shortest = INFINITY, mass = 0;
+  for (std::size_t first = 0, last = 0; last < sorted.size(); ++last) {
+    mass += sorted[last].weight;
+    for (; mass - sorted[first].weight >= part; ++first) mass -= sorted[first].weight;
+    if (mass >= part) shortest = std::min(shortest, sorted[last].mean - sorted[first].mean);
+  }
+  const double sd = std::sqrt(variance), S = std::clamp(shortest / width_of_part, sd / 8, sd);
+  const double h = kernel_width * S;
+  if (!(h > 0)) return;
+  for (Gaussian& g : gaussians_) {
+    const double total = g.sd * g.sd + h * h;
+    g.kernel = h * h / total;
+    g.sd = std::sqrt(total);
+  }
 }
 
 // Mean and variance of each family, relative to its first child so that nothing cancels.
@@ -193,8 +240,15 @@ void Marginal::merge(std::vector<Family>& families) {
 
 double Marginal::distribution(double x) const {
   double sum = 0;
-  for (const Gaussian& g : gaussians_)
-    sum += g.weight * (g.sd > 0 ? normal_distribution((x - g.mean) / g.sd) : (g.mean <= x ? 1.0 : 0.0));
+  for (const Gaussian& g : gaussians_) {
+    if (!(g.sd > 0)) {
+      sum += g.mean <= x ? g.weight : 0.0;
+      continue;
+    }
+    const double z = (x - g.mean) / g.sd;
+    sum += g.weight * normal_distribution(z);
+    if (g.kernel > 0) sum += g.weight * normal_density(z) * distribution_term(z, g.kernel);
+  }
   if (gaussians_.empty())
     for (std::size_t n = 0; n < atoms_.size(); ++n) sum += atoms_[n] <= x ? weight_[n] : 0.0;
   return sum;
@@ -206,9 +260,9 @@ double Marginal::density(double x) const {
   for (const Gaussian& g : gaussians_) {
     if (!(g.sd > 0)) continue;
     const double z = (x - g.mean) / g.sd;
-    sum += g.weight * std::exp(-z * z / 2) / g.sd;
+    sum += g.weight * normal_density(z) * density_factor(z, g.kernel) / g.sd;
   }
-  return sum / std::sqrt(2 * std::numbers::pi);
+  return std::max(0.0, sum);
 }
 
 double Marginal::gaussian_quantile(double level) const {
@@ -234,7 +288,10 @@ double Marginal::gaussian_quantile(double level) const {
 
 void Marginal::quantiles(std::span<const double> levels, std::span<double> out) const {
   if (!gaussians_.empty()) {
-    for (std::size_t q = 0; q < levels.size(); ++q) out[q] = gaussian_quantile(levels[q]);
+    for (std::size_t q = 0; q < levels.size(); ++q) {
+      out[q] = gaussian_quantile(levels[q]);
+      if (gaussians_.front().kernel > 0) out[q] = std::clamp(out[q], lowest_, highest_);
+    }
     return;
   }
   AtomQuantiles(atoms_, weight_).at(levels, out);

@@ -7,12 +7,18 @@
 
 namespace wienertree {
 
-/// A Gaussian sum is used as it is. Children of a tree stand for a diffusion's step: c atoms a parent, which
-/// on a uniform grid with constant diffusion pile up on a lattice of the width of a step, so that their own
-/// distribution function is a staircase. Each family is therefore replaced by the Gaussian of its mean and
-/// variance, the leading order of the step's true law; mean and variance of the whole are unchanged. Other
-/// Dirac masses (particles, a start) are left as they are: their distribution function is taken to pass
-/// through (x_(n), w_(1) + .. + w_(n-1) + w_(n)/2) and to be linear between.
+/// A Gaussian sum is used as it is. Children of a tree stand for a diffusion's step: c atoms a parent, which pile up on a
+/// lattice of the width of a step, and the parents themselves are far apart beside a short step, so that the atoms' own
+/// distribution function is a staircase. Each family is therefore replaced by the Gaussian N(m_i, C_i) of its mean and
+/// variance, the leading order of the step's true law, and the sum of these is smoothed by a Gaussian kernel of standard
+/// deviation h whose effect is taken back to order h^6:
+///     f = (1 - h^2/2 D^2 + h^4/8 D^4 - h^6/48 D^6) (sum_i w_i N(m_i, C_i + h^2)),
+/// a kernel of order 8 (its first seven moments but the mass are 0), so that moments to degree 7 are those of the nodes.
+/// h is a part of the law's narrowest width: the shortest interval that holds 1/5 of the mass, as wide as in a Gaussian
+/// of standard deviation S, and h = 0.35 S, with S at least 1/8 of the law's own. The density, negative by at most the
+/// kernel's side lobes, is cut at 0, and quantiles stay within the nodes that have mass, so inside the state's bounds.
+/// Other Dirac masses (particles, a start) are left as they are: their distribution function is taken to pass through
+/// (x_(n), w_(1) + .. + w_(n-1) + w_(n)/2) and to be linear between.
 ///
 /// More than 512 Gaussians are merged, mean and variance kept, into as many cells over the mean +- 8 standard
 /// deviations: a cell is then 1/32 standard deviation wide.
@@ -31,6 +37,7 @@ class Marginal {
  private:
   struct Gaussian {
     double weight, mean, sd;
+    double kernel = 0;  ///< rho = h^2/sd^2, the part of the variance that is the kernel's
   };
   struct Family {
     double weight, mean, variance;
@@ -38,8 +45,10 @@ class Marginal {
   void add_families(std::size_t parents, std::vector<Family>& out) const;
   static void merge(std::vector<Family>& families);
   double gaussian_quantile(double level) const;
+  void smooth();
 
   bool has_density_ = false;
+  double lowest_ = 0, highest_ = 0;         ///< nodes with mass, of families
   std::vector<Gaussian> gaussians_;         ///< empty for Dirac masses
   std::span<const double> atoms_, weight_;  ///< Dirac masses
 };

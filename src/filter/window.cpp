@@ -10,12 +10,10 @@
 #include "wienertree/numeric/memory.hpp"
 
 namespace wienertree {
-namespace {
 
-// Row indices nearest to the uniform grid of n steps, strictly increasing. n <= rows - 1 makes this possible:
-// point j may not go below the point before it plus one, nor above the row that leaves one for each point to
-// come.
-std::vector<std::size_t> grid_rows(std::span<const double> t, std::size_t n) {
+// n <= rows - 1 makes this possible: point j may not go below the point before it plus one, nor above the row that
+// leaves one for each point to come.
+std::vector<std::size_t> rows_on_grid(std::span<const double> t, std::size_t n) {
   std::vector<std::size_t> rows(n + 1, 0);
   const double T = t.back() - t.front();
   for (std::size_t j = 1; j <= n; ++j) {
@@ -26,8 +24,6 @@ std::vector<std::size_t> grid_rows(std::span<const double> t, std::size_t n) {
   }
   return rows;
 }
-
-}  // namespace
 
 ObservationWindows::ObservationWindows(ObservationRows path, ObservationKind kind, ObservationTiming timing,
                                        std::size_t steps)
@@ -41,7 +37,7 @@ ObservationWindows::ObservationWindows(ObservationRows path, ObservationKind kin
     if (steps > gaps)
       throw InputError(fmt::format("more steps than the observation has gaps between rows ({})", gaps),
                        "steps", std::to_string(steps));
-    const auto rows = grid_rows(t, steps == 0 ? gaps : steps);
+    const auto rows = rows_on_grid(t, steps == 0 ? gaps : steps);
     for (std::size_t j = 1; j < rows.size(); ++j)
       windows_.push_back({t[rows[j - 1]], t[rows[j]], rows[j - 1], rows[j], false, false});
     return;
@@ -83,6 +79,13 @@ ObservationWindows::ObservationWindows(ObservationRows path, ObservationKind kin
       windows_.push_back({at(i - 1), at(i), r, r, present(r) && (previous ? i == 1 : i == parts), previous});
     }
   }
+}
+
+ObservationWindows::ObservationWindows(ObservationRows path, std::span<const std::size_t> boundaries)
+    : rows_(path), kind_(ObservationKind::continuous) {
+  for (std::size_t j = 1; j < boundaries.size(); ++j)
+    windows_.push_back({path.times[boundaries[j - 1]], path.times[boundaries[j]], boundaries[j - 1],
+                        boundaries[j], false, false});
 }
 
 void ObservationWindows::get(std::size_t j, ObservationWindow& out) const {

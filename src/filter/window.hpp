@@ -49,6 +49,8 @@ class ObservationWindows {
   /// @throws InputError if steps exceeds the number of gaps between rows (continuous), or is smaller than it
   /// (discrete), or a first row is given where timing "previous" has no earlier state
   ObservationWindows(ObservationRows rows, ObservationKind kind, ObservationTiming timing, std::size_t steps);
+  /// Of a continuous record, from each of `boundaries` to the next: row numbers that increase, the first 0.
+  ObservationWindows(ObservationRows rows, std::span<const std::size_t> boundaries);
   std::size_t size() const { return windows_.size(); }
   /// Window j = 0..size()-1; buffers of `out` are reused.
   void get(std::size_t j, ObservationWindow& out) const;
@@ -66,6 +68,10 @@ class ObservationWindows {
   ObservationKind kind_;
   std::vector<Bounds> windows_;
 };
+
+/// Row numbers nearest to a uniform grid of n steps, strictly increasing, from the first row to the last.
+/// @pre 1 <= n < number of times
+std::vector<std::size_t> rows_on_grid(std::span<const double> times, std::size_t n);
 
 /// Fills increment, integral and covariation of a continuous window from its rows.
 void integrate_rows(ObservationWindow& window, std::size_t dimension);

@@ -28,7 +28,7 @@ double deviation(const std::vector<PosteriorSummary>& launches, Get get) {
 }  // namespace
 
 void exchange(StateArchive& archive, LaunchesSummary& s) {
-  archive(s.mean, s.nodes, s.mean_sd, s.log_evidence_sd, s.ratio);
+  archive(s.mean, s.nodes, s.mean_sd, s.log_evidence_sd, s.log_evidence_error, s.ratio);
 }
 
 double log_average(std::span<const double> logarithms) {
@@ -58,7 +58,7 @@ void Launches::summarise(double time, int highest_moment, LaunchesSummary& out) 
   out.mean.time = time;
   out.nodes = static_cast<double>(out.mean.nodes);
   out.mean_sd.assign(components_, 0.0);
-  out.log_evidence_sd = 0;
+  out.log_evidence_sd = out.log_evidence_error = 0;
   if (filters_.size() == 1) return;
   for (std::size_t i = 0; i < components_; ++i) {
     for (auto part : {&PosteriorSummary::mean, &PosteriorSummary::sd, &PosteriorSummary::q05,
@@ -74,18 +74,16 @@ void Launches::summarise(double time, int highest_moment, LaunchesSummary& out) 
   for (const PosteriorSummary& s : summaries_) log_evidences.push_back(s.log_evidence);
   out.mean.log_evidence = log_average(log_evidences);
   out.log_evidence_sd = deviation(summaries_, log_evidence);
+  const auto M = static_cast<double>(filters_.size());
+  double squares = 0;
+  for (const double l : log_evidences) squares += std::pow(std::expm1(l - out.mean.log_evidence), 2);
+  out.log_evidence_error = std::sqrt(squares / (M - 1) / M);
   out.mean.ess = average(summaries_, [](const auto& s) { return s.ess; });
   out.nodes = average(summaries_, [](const auto& s) { return static_cast<double>(s.nodes); });
 }
 
 void Launches::exchange(StateArchive& archive) {
   for (const auto& filter : filters_) filter->exchange(archive);
-}
-
-std::vector<double> Launches::log_evidences() {
-  std::vector<double> all;
-  for (const auto& filter : filters_) all.push_back(filter->posterior().log_evidence);
-  return all;
 }
 
 std::optional<LikelihoodRatio> Launches::average_ratio() {
@@ -101,6 +99,15 @@ std::optional<LikelihoodRatio> Launches::average_ratio() {
   average.log_mean = log_average(log_mean);
   average.log_variance = log_average(log_variance);
   return average;
+}
+
+std::vector<FilterWarning> Launches::warnings() const {
+  std::vector<FilterWarning> all;
+  for (const auto& filter : filters_)
+    for (const FilterWarning& w : filter->warnings())
+      if (std::ranges::none_of(all, [&](const FilterWarning& known) { return known.kind == w.kind; }))
+        all.push_back(w);
+  return all;
 }
 
 FilterStatistics Launches::statistics() const {

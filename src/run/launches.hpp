@@ -17,6 +17,8 @@ struct LaunchesSummary {
   std::vector<double>
       mean_sd;  ///< per component: standard deviation over the launches of the posterior mean; 0 for M = 1
   double log_evidence_sd = 0;
+  /// Standard error of the log of the averaged evidence: sd(Z)/(mean(Z) sqrt(M)), from the launches' Z; 0 for M = 1.
+  double log_evidence_error = 0;
   std::optional<LikelihoodRatio> ratio;  ///< of a filter that keeps it: averages of L and of its variance
 };
 
@@ -34,11 +36,11 @@ class Launches {
   /// The law of the first launch.
   const Posterior& posterior() { return filters_.front()->posterior(); }
   void summarise(double time, int highest_moment, LaunchesSummary& out);
-  /// Of each launch.
-  std::vector<double> log_evidences();
   void exchange(StateArchive& archive);
   /// Work of all launches together.
   FilterStatistics statistics() const;
+  /// Of the launches, one of each kind.
+  std::vector<FilterWarning> warnings() const;
 
  private:
   std::optional<LikelihoodRatio> average_ratio();

@@ -37,6 +37,7 @@ class RecordedWindows final : public WindowSource {
   std::size_t rows() const override { return rows_.rows(); }
   bool has_inner_rows() const override { return inner_rows_; }
   bool streams() const override { return false; }
+  std::optional<ObservationRows> record() const override { return rows_; }
   std::string identity() const override {
     const auto bytes = [](std::span<const double> numbers) {
       return std::string_view(reinterpret_cast<const char*>(numbers.data()), numbers.size() * sizeof(double));

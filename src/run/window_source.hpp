@@ -29,6 +29,8 @@ class WindowSource {
   /// trapezoid.
   virtual bool has_inner_rows() const = 0;
   virtual bool streams() const = 0;
+  /// All rows, where they are known beforehand.
+  virtual std::optional<ObservationRows> record() const { return {}; }
   /// What tells a record from another one.
   virtual std::string identity() const = 0;
   /// How far it has come. A stream that has read this takes rows after the last one it had and passes over

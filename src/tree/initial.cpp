@@ -12,7 +12,9 @@ namespace wienertree {
 namespace {
 
 constexpr std::size_t fewest_points =
-    1000;                      // of a grid: the first observation may be much sharper than the start
+    1000;  // of a grid: the first observation may be much sharper than the start
+// The trapezoidal rule of spacing h errs by about 2 exp(-2 pi^2/h^2) in a Gaussian's moments: 3e-5 for 10 points.
+constexpr Eigen::Index fewest_per_axis = 10;
 constexpr double reach = 6.0;  // mass beyond 6 standard deviations: 2e-9
 
 // Columns are standard normal points in R^r with log-weights, normalised to mass one.
@@ -75,7 +77,7 @@ Generation first_generation(const Model& model, std::size_t nodes) {
   } else {
     const auto per_axis = static_cast<Eigen::Index>(std::floor(
         std::pow(static_cast<double>(std::max(nodes, fewest_points)), 1.0 / static_cast<double>(r)) + 1e-9));
-    standard = per_axis >= 5 ? tensor_grid(r, per_axis) : cubature_points(r);
+    standard = per_axis >= fewest_per_axis ? tensor_grid(r, per_axis) : cubature_points(r);
   }
   const Eigen::MatrixXd points = (root * standard.points).colwise() + law.mean;
   g.states.reshape(d, static_cast<std::size_t>(points.cols()));

@@ -139,7 +139,7 @@ TEST_CASE("pictures are drawn as SVG and PNG") {
   const Workplace place;
   cli::simulate_benes(place);
   const std::string filter =
-      "filter benes --observations Y.csv --steps 40 --output o.csv --signal X.csv --plot ";
+      "filter benes --method klv --observations Y.csv --steps 40 --output o.csv --signal X.csv --plot ";
   output_of(place, filter + "p.svg");
   output_of(place, filter + "p.png");
   output_of(place, filter + "d.svg --density-at 2");

@@ -67,10 +67,10 @@ TEST_CASE("a model's own parameters go before those of all") {
 TEST_CASE("compare writes JSON and draws a picture") {
   const Workplace place;
   simulate_benes(place);
-  REQUIRE(
-      place
-          .run("compare benes benes:h1=0.6 --observations Y.csv --output out.json --format json --plot p.svg")
-          .code == 0);
+  REQUIRE(place
+              .run("compare benes benes:h1=0.6 --method klv --observations Y.csv --output out.json --format "
+                   "json --plot p.svg")
+              .code == 0);
   const auto report = nlohmann::json::parse(place.read("out.json"));
   CHECK(report["models"][1]["parameters"]["h1"] == 0.6);
   CHECK(report["models"][0]["options"]["method"] == "klv");

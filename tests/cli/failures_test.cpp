@@ -105,11 +105,12 @@ TEST_CASE("nodes are dropped only if asked, and never without a word") {
 TEST_CASE("a file that cannot be read is one line") {
   const Workplace place;
   simulate_benes(place);
-  check_failure(place, "filter benes --observations /proc/self/mem", 2, {"/proc/self/mem", "cannot be read"});
-  check_failure(place, "filter benes --observations Y.csv --plot p.svg --signal /proc/self/mem", 2,
-                {"/proc/self/mem"});
+  check_failure(place, "filter benes --method klv --observations /proc/self/mem", 2,
+                {"/proc/self/mem", "cannot be read"});
+  check_failure(place, "filter benes --method klv --observations Y.csv --plot p.svg --signal /proc/self/mem",
+                2, {"/proc/self/mem"});
   check_failure(place, "filter ./m.toml --observations Y.csv", 2, {"m.toml"});
   Workplace directory;
   directory.input_from = "/";
-  check_failure(directory, "filter benes -", 2, {"standard input:1", "reading failed"});
+  check_failure(directory, "filter benes --method klv -", 2, {"standard input:1", "reading failed"});
 }

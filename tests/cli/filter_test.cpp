@@ -43,7 +43,8 @@ TEST_CASE("simulate writes observations and signal, the same for the same seed")
 TEST_CASE("filter writes a row a step with the columns of the interface") {
   const Workplace place;
   cli::simulate_benes(place);
-  const Columns table(output_of(place, "filter benes --observations Y.csv --steps 80 --moments 3"));
+  const Columns table(
+      output_of(place, "filter benes --method klv --observations Y.csv --steps 80 --moments 3"));
   CHECK(joined(table.names()) == "t,mean_x,sd_x,q05_x,q50_x,q95_x,log_evidence,nodes,ess,m2_x,m3_x");
   REQUIRE(table.rows() == 81);
   CHECK(table["t"].front() == 0);
@@ -68,16 +69,17 @@ TEST_CASE("filter writes a row a step with the columns of the interface") {
 TEST_CASE("the summary for people goes to standard error, and --quiet keeps it back") {
   const Workplace place;
   cli::simulate_benes(place);
-  const Outcome told = place.run("filter benes --observations Y.csv --output out.csv");
+  const Outcome told = place.run("filter benes --method klv --observations Y.csv --output out.csv");
   CHECK(told.out.empty());
   for (const char* part : {"KLV filter", "benes", "401 rows", "200 steps", "functional second-order",
                            "posterior at t = 4", "mean", "exact", "difference", "log evidence", "ODE solves"})
     CHECK_THAT(told.err, Catch::Contains(part));
   CHECK(Columns(place.read("out.csv")).rows() == 201);
-  const Outcome quiet = place.run("filter benes --observations Y.csv --quiet");
+  const Outcome quiet = place.run("filter benes --method klv --observations Y.csv --quiet");
   CHECK(quiet.err.empty());
   CHECK(quiet.out == place.read("out.csv"));
-  const Outcome every_row = place.run("filter benes --observations Y.csv --steps 400 --output out.csv");
+  const Outcome every_row =
+      place.run("filter benes --method klv --observations Y.csv --steps 400 --output out.csv");
   CHECK_THAT(every_row.err, Catch::Contains("second-order (as trapezoid: no rows inside the steps)"));
 }
 
@@ -166,14 +168,16 @@ TEST_CASE("every value of every option works and agrees with the exact filter") 
     INFO(options);
     const std::string base = std::string(options).find("--steps") == std::string::npos
                                  ? filter
-                                 : "filter benes --observations Y.csv --quiet ";
+                                 : "filter benes --method klv --observations Y.csv --quiet ";
     const Columns table(output_of(place, base + options));
     CHECK(table["mean_x"].back() == Approx(exact["mean_x"].back()).margin(0.25));
     CHECK(table["log_evidence"].back() == Approx(exact["log_evidence"].back()).margin(0.25));
   }
   output_of(place, "simulate ornstein-uhlenbeck --horizon 1 --steps 100 --observations OU.csv");
-  const Columns by_exact(output_of(place, "filter ornstein-uhlenbeck --observations OU.csv --flow exact"));
-  const Columns by_cvode(output_of(place, "filter ornstein-uhlenbeck --observations OU.csv --flow cvode"));
+  const Columns by_exact(
+      output_of(place, "filter ornstein-uhlenbeck --method klv --observations OU.csv --flow exact"));
+  const Columns by_cvode(
+      output_of(place, "filter ornstein-uhlenbeck --method klv --observations OU.csv --flow cvode"));
   CHECK(by_exact["mean_x"].back() == Approx(by_cvode["mean_x"].back()).margin(1e-6));
 }
 
@@ -196,16 +200,16 @@ TEST_CASE("standard input is filtered row by row, with the same numbers as a fil
   Workplace place;
   cli::simulate_benes(place);
   place.input = place.read("Y.csv");
-  const std::string streamed = output_of(place, "filter benes --observations - --quiet");
-  CHECK(streamed == output_of(place, "filter benes --observations Y.csv --steps 400 --quiet"));
+  const std::string streamed = output_of(place, "filter benes --method klv --observations - --quiet");
+  CHECK(streamed == output_of(place, "filter benes --method klv --observations Y.csv --steps 400 --quiet"));
   const std::filesystem::path nile =
       std::filesystem::path(WIENERTREE_SOURCE_DIR) / "data/observations/nile.csv";
   place.input = place.read(nile.string());
-  CHECK(output_of(place, "filter nile --observations - --quiet") ==
-        output_of(place, "filter nile --observations " + nile.string() + " --steps 99 --quiet"));
+  CHECK(output_of(place, "filter nile --method klv --observations - --quiet") ==
+        output_of(place, "filter nile --method klv --observations " + nile.string() + " --steps 99 --quiet"));
   // A bad row ends the run; what was told before it was told in time.
   place.input = "t,y1\n0,0\n0.1,0.1\n0.2,nan\n";
-  const Outcome outcome = place.run("filter benes --observations - --quiet");
+  const Outcome outcome = place.run("filter benes --method klv --observations - --quiet");
   CHECK(outcome.code == 2);
   CHECK_THAT(outcome.err, Catch::Contains("standard input:4"));
   CHECK(cli::lines_of(outcome.out).size() == 3);
@@ -213,7 +217,8 @@ TEST_CASE("standard input is filtered row by row, with the same numbers as a fil
 
 TEST_CASE("filter reads standard input row by row and answers each row before the next") {
   const Workplace place;
-  for (const char* command : {"filter benes --observations - --quiet", "filter benes - --quiet"}) {
+  for (const char* command :
+       {"filter benes --method klv --observations - --quiet", "filter benes - --quiet"}) {
     cli::Running filter = place.start(command, true);
     filter.tell("t,y1\n0,0\n");
     CHECK_THAT(filter.read_line(), Catch::StartsWith("t,mean_x"));
@@ -232,7 +237,7 @@ TEST_CASE("filter reads standard input row by row and answers each row before th
 TEST_CASE("discrete observations: the Nile against the published Kalman filter") {
   const Workplace place;
   const std::string nile = std::string(WIENERTREE_SOURCE_DIR) + "/data/observations/nile.csv";
-  const Columns table(output_of(place, "filter nile --observations " + nile));
+  const Columns table(output_of(place, "filter nile --method klv --observations " + nile));
   // Durbin, Koopman (2012), section 2.2: log-likelihood -641.585578, mean and variance in 1970: 798.36911,
   // 4032.08089.
   CHECK(table["t"].back() == 1970);

@@ -25,7 +25,8 @@ TEST_CASE("every example is accepted by the reader of its format") {
   write_example(w, "formula", "f.json");
   CHECK(output_of(w, "formulas verify f.json").find("f.json") == 0);
   write_example(w, "observations", "Y.csv");
-  CHECK(lines_of(output_of(w, "filter benes --observations Y.csv --quiet --output -")).size() == 1 + 5);
+  CHECK(lines_of(output_of(w, "filter benes --method klv --observations Y.csv --quiet --output -")).size() ==
+        1 + 5);
   CHECK(lines_of(
             output_of(w, "filter m.toml --observations Y.csv --steps 4 --formula f.json --quiet --output -"))
             .size() > 5);

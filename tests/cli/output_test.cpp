@@ -10,7 +10,7 @@ using cli::Workplace;
 TEST_CASE("a file that cannot be written whole leaves what was there") {
   Workplace place;
   cli::simulate_benes(place);
-  const std::string filter = "filter benes --observations Y.csv --output out.csv";
+  const std::string filter = "filter benes --method klv --observations Y.csv --output out.csv";
   const std::vector<std::string> fresh = place.files();
   place.largest_file = 1000;  // the table has about 40 000 bytes
   for (const bool exists : {false, true}) {
@@ -45,7 +45,8 @@ TEST_CASE("a run that fails leaves existing results as they were") {
   place.write("out.csv", "precious\n");
   place.write("out.svg", "precious\n");
   place.write("Y.csv", "t,y1\n0,0\n1,nan\n");
-  CHECK(place.run("filter benes --observations Y.csv --output out.csv --plot out.svg").code == 2);
+  CHECK(place.run("filter benes --method klv --observations Y.csv --output out.csv --plot out.svg").code ==
+        2);
   CHECK(place.read("out.csv") == "precious\n");
   CHECK(place.read("out.svg") == "precious\n");
   CHECK(place.files().size() == 3);
@@ -54,7 +55,7 @@ TEST_CASE("a run that fails leaves existing results as they were") {
 TEST_CASE("a full device is an error") {
   Workplace place;
   cli::simulate_benes(place);
-  Outcome outcome = place.run("filter benes --observations Y.csv --output /dev/full");
+  Outcome outcome = place.run("filter benes --method klv --observations Y.csv --output /dev/full");
   CHECK(outcome.code == 1);
   CHECK(cli::lines_of(outcome.err).size() == 1);
   CHECK_THAT(outcome.err, Catch::Contains("--output") && Catch::Contains("/dev/full"));
@@ -91,7 +92,7 @@ TEST_CASE("a link to a file stays a link, and a file keeps its permissions") {
   place.write("real.csv", "old\n");
   std::filesystem::permissions(place.directory() / "real.csv", std::filesystem::perms(0640));
   std::filesystem::create_symlink("real.csv", place.directory() / "link.csv");
-  CHECK(place.run("filter benes --observations Y.csv --output link.csv").code == 0);
+  CHECK(place.run("filter benes --method klv --observations Y.csv --output link.csv").code == 0);
   CHECK(std::filesystem::is_symlink(place.directory() / "link.csv"));
   CHECK_THAT(place.read("real.csv"), Catch::StartsWith("t,mean_x,"));
   CHECK(std::filesystem::status(place.directory() / "real.csv").permissions() ==

@@ -58,7 +58,7 @@ TEST_CASE("wrong usage is refused with the option, the value and the nearest rig
       {filter + "--node 10", {"filter", "unknown option", "--node", "did you mean '--nodes'"}},
       {filter + "--degre=5", {"--degre", "did you mean '--degree'"}},
       {filter + "stray", {"one argument too many", "stray"}},
-      {"filter benes", {"filter", "--observations"}},
+      {"filter benes --method klv", {"filter", "--observations"}},
       {"filter", {"filter", "MODEL"}},
       {filter + "--nodes 0", {"--nodes", "at least 1", "(0)"}},
       {filter + "--nodes -5", {"--nodes", "(-5)"}},
@@ -108,9 +108,9 @@ TEST_CASE("wrong usage is refused with the option, the value and the nearest rig
       {filter + "--observations - --steps 5", {"--observations"}},
       {"filter cir --observations Y.csv", {"observation"}},
       {"filter lorenz36 --observations Y.csv", {"did you mean 'lorenz63'", "(lorenz36)"}},
-      {"filter linear-3d --observations Y.csv", {"Y.csv:1", "t,y1,y2"}},
-      {"filter benes --observations none.csv", {"none.csv"}},
-      {"filter benes --observations .", {"."}},
+      {"filter linear-3d --method klv --observations Y.csv", {"Y.csv:1", "t,y1,y2"}},
+      {"filter benes --method klv --observations none.csv", {"none.csv"}},
+      {"filter benes --method klv --observations .", {"."}},
       {"simulate benes --horizon -1 --steps 10 --observations Z.csv", {"--horizon", "positive", "(-1)"}},
       {"simulate benes --horizon nan --steps 10 --observations Z.csv", {"--horizon", "(nan)"}},
       {"simulate benes --horizon 1 --steps 0 --observations Z.csv", {"--steps", "(0)"}},
@@ -193,7 +193,8 @@ TEST_CASE("a formula with one digit changed is refused with the word") {
   place.write("f.json", replaced(good, "0.33333333", "0.33333334"));
   check_refusal(place, "formulas verify f.json", 2, {"f.json", "word"});
   check_refusal(place, "formulas show ./f.json", 2, {"f.json", "word"});
-  check_refusal(place, "filter benes --observations Y.csv --formula f.json", 2, {"f.json", "word"});
+  check_refusal(place, "filter benes --method klv --observations Y.csv --formula f.json", 2,
+                {"f.json", "word"});
   place.write("f.json", good.substr(0, good.size() / 2));
   check_refusal(place, "formulas verify f.json", 2, {"f.json", "line"});
 }
@@ -214,7 +215,8 @@ TEST_CASE("a plot without gnuplot is refused before anything is computed") {
   Workplace place;
   cli::simulate_benes(place);
   place.environment["PATH"] = place.directory().string();
-  check_refusal(place, "filter benes --observations Y.csv --plot p.svg", 2, {"--plot", "gnuplot", "PATH"});
+  check_refusal(place, "filter benes --method klv --observations Y.csv --plot p.svg", 2,
+                {"--plot", "gnuplot", "PATH"});
 }
 
 TEST_CASE("bundled data that is not there is named") {
