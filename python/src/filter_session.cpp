@@ -21,6 +21,7 @@ void add_session_options(CLI::App& app, FilterRequested& requested) {
   app::add_record_steps(app, requested.steps);
   app::add_filter_options(app, requested.filter);
   app::add_moments(app, requested.moments);
+  app::add_accuracy_options(app, requested.accuracy);
 }
 
 FilterSession::FilterSession(const py::object& model, const py::object& observations, py::dict options)
@@ -42,8 +43,10 @@ FilterSession::FilterSession(const py::object& model, const py::object& observat
     throw InputError("has no meaning with --method " + app::method_name(setup_.options.method), "--formula");
   highest_moment_ = static_cast<int>(requested.moments.value_or(0));
   read(observations, requested.steps);
-  refuse_oversized_tree(m, setup_.options, windows_->size());
-  launches_ = std::make_unique<Launches>(m, setup_);
+  control_ = std::make_unique<ControlledFilter>(
+      m, setup_,
+      app::control_options(requested.accuracy, requested.filter, requested.steps, requested.moments),
+      *source_->record());
 }
 
 void FilterSession::read(const py::object& observations, std::optional<std::size_t> steps) {
@@ -51,7 +54,7 @@ void FilterSession::read(const py::object& observations, std::optional<std::size
   if (is_file(observations)) {
     const auto file = py::module_::import("os").attr("fspath")(observations).cast<std::string>();
     if (file == "-") throw InputError("standard input is not read here", "observations", file);
-    windows_ = open_windows(file, m, steps);
+    source_ = open_windows(file, m, steps);
     return;
   }
   if (py::hasattr(observations, "observations")) {  // a Simulation
@@ -73,18 +76,28 @@ void FilterSession::read(const py::object& observations, std::optional<std::size
         "dimensions " + std::to_string(times_.ndim()) + " and " + std::to_string(values_.ndim()));
   const ObservationRows rows{m.observation_dimension(), values_of(times_), values_of(values_)};
   check_observations(rows, "observations", m.observation);
-  windows_ = cut_windows(rows, m, steps);
+  source_ = cut_windows(rows, m, steps);
 }
 
 bool FilterSession::advance() {
   if (finished_) return false;
   finished_ = true;  // should what follows throw
-  double time = windows_->start();
-  if (steps_ > 0 || windows_->observed_at_start()) {
-    if (!windows_->next(window_)) return false;
-    refuse_oversized_tree(model_.model(), setup_.options, window_.step);
+  if (!launches_) {
+    while (control_->advance()) {
+    }
+    setup_ = control_->answer_setup();
+    windows_.emplace(control_->answer_windows());
+    launches_ = std::make_unique<Launches>(model_.model(), setup_);
+  }
+  const std::vector<LaunchesSummary>& rows = control_->answer().rows;
+  if (steps_ == rows.size()) return false;
+  // The answer has a row at the start unless an observation is weighed there.
+  const double time = rows[steps_].mean.time;
+  const bool at_start = steps_ == 0 && (windows_->size() == 0 || windows_->time(0) > windows_->start());
+  for (bool there = at_start; !there && next_ < windows_->size();) {
+    windows_->get(next_++, window_);
     launches_->advance(window_);
-    time = window_.end;
+    there = window_.end == time;
   }
   ++steps_;
   launches_->summarise(time, highest_moment_, row_);
@@ -98,7 +111,7 @@ std::vector<std::string> FilterSession::states() const {
 }
 
 py::dict FilterSession::options_in_force() const {
-  return to_dict(app::options_in_force(setup_, model_.model()));
+  return to_dict(app::options_in_force(launches_ ? setup_ : control_->chosen_setup(), model_.model()));
 }
 
 FilterSession::Use::Use(FilterSession& session) : session_(session) {

@@ -70,32 +70,36 @@ py::object filter(const py::object& model, const py::object& observations, const
   {
     const py::gil_scoped_release unlocked;
     Interrupts interrupts;
-    while (session.advance()) {
-      columns.append(session.row(), several);
-      interrupts.check();
-    }
+    while (session.search()) interrupts.check();
   }
+  const ControlledFilter& control = session.control();
+  const Accuracy accuracy = control.accuracy();
+  for (const LaunchesSummary& row : control.answer().rows) columns.append(row, several);
+  py::object error = py::none();
+  if (accuracy.known)
+    error = py::dict("mean"_a = accuracy.error.mean, "sd"_a = accuracy.error.sd,
+                     "quantile"_a = accuracy.error.quantile, "log_evidence"_a = accuracy.error.log_evidence);
   const std::chrono::duration<double> took = std::chrono::steady_clock::now() - began;
   const std::size_t d = session.states().size();
   py::dict moments;
   for (std::size_t k = 0; k < columns.moments.size(); ++k)
     moments[py::int_(k + 2)] = hand_over_rows(std::move(columns.moments[k]), d);
   return py::module_::import("wienertree.results")
-      .attr("FilterResult")("states"_a = session.states(), "t"_a = hand_over(std::move(columns.t)),
-                            "mean"_a = hand_over_rows(std::move(columns.mean), d),
-                            "sd"_a = hand_over_rows(std::move(columns.sd), d),
-                            "q05"_a = hand_over_rows(std::move(columns.q05), d),
-                            "q50"_a = hand_over_rows(std::move(columns.q50), d),
-                            "q95"_a = hand_over_rows(std::move(columns.q95), d), "moments"_a = moments,
-                            "log_evidence"_a = hand_over(std::move(columns.log_evidence)),
-                            "nodes"_a = hand_over(std::move(columns.nodes)),
-                            "ess"_a = hand_over(std::move(columns.ess)),
-                            "mc_sd"_a = rows_or_none(std::move(columns.mc_sd), d),
-                            "mc_sd_log_evidence"_a = column_or_none(std::move(columns.mc_sd_log_evidence)),
-                            "log_bayes_factor"_a = column_or_none(std::move(columns.log_bayes_factor)),
-                            "log_variance"_a = column_or_none(std::move(columns.log_variance)),
-                            "options"_a = session.options_in_force(),
-                            "statistics"_a = statistics_of(session.statistics()), "seconds"_a = took.count());
+      .attr("FilterResult")(
+          "states"_a = session.states(), "t"_a = hand_over(std::move(columns.t)),
+          "mean"_a = hand_over_rows(std::move(columns.mean), d),
+          "sd"_a = hand_over_rows(std::move(columns.sd), d),
+          "q05"_a = hand_over_rows(std::move(columns.q05), d),
+          "q50"_a = hand_over_rows(std::move(columns.q50), d),
+          "q95"_a = hand_over_rows(std::move(columns.q95), d), "moments"_a = moments,
+          "log_evidence"_a = hand_over(std::move(columns.log_evidence)),
+          "nodes"_a = hand_over(std::move(columns.nodes)), "ess"_a = hand_over(std::move(columns.ess)),
+          "mc_sd"_a = rows_or_none(std::move(columns.mc_sd), d),
+          "mc_sd_log_evidence"_a = column_or_none(std::move(columns.mc_sd_log_evidence)),
+          "log_bayes_factor"_a = column_or_none(std::move(columns.log_bayes_factor)),
+          "log_variance"_a = column_or_none(std::move(columns.log_variance)), "error"_a = error,
+          "warnings"_a = control.warnings(), "options"_a = session.options_in_force(),
+          "statistics"_a = statistics_of(session.statistics()), "seconds"_a = took.count());
 }
 
 // The law at one step: its numbers for good, its nodes until the filter takes the next step.

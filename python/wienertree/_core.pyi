@@ -120,6 +120,8 @@ def filter(
     beta: Optional[float] = None,
     launches: Optional[int] = None,
     moments: Optional[int] = None,
+    tolerance: Optional[float] = None,
+    work: Optional[float] = None,
     set: _Set = None,
 ) -> FilterResult: ...
 
@@ -150,6 +152,8 @@ class Filter:
         beta: Optional[float] = None,
         launches: Optional[int] = None,
         moments: Optional[int] = None,
+        tolerance: Optional[float] = None,
+        work: Optional[float] = None,
         set: _Set = None,
     ) -> None: ...
     def __iter__(self) -> Filter: ...

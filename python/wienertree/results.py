@@ -45,6 +45,10 @@ class FilterResult(Mapping[str, Array]):
         # The weighted filter: likelihood ratio against noise alone, else None.
         self.log_bayes_factor: Optional[Array] = parts["log_bayes_factor"]  # (M,)
         self.log_variance: Optional[Array] = parts["log_variance"]  # (M,)
+        # Largest estimated errors, "mean", "sd", "quantile" in posterior standard deviations and "log_evidence"; None
+        # where nothing is known of them.
+        self.error: Optional[dict[str, float]] = parts["error"]
+        self.warnings: list[str] = parts["warnings"]  # what makes the answer doubtful, a sentence each
         self.options: dict[str, Any] = parts["options"]  # in force
         self.statistics: dict[str, float] = parts["statistics"]  # work done
         self.seconds: float = parts["seconds"]  # of computing

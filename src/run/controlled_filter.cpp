@@ -371,6 +371,9 @@ void ControlledFilter::finish() {
 
 const FinishedRun& ControlledFilter::answer() const { return *find(RunRole::level, answer_level()); }
 FilterSetup ControlledFilter::answer_setup() const { return plan(RunRole::level, answer_level()).setup; }
+FilterSetup ControlledFilter::chosen_setup() const {
+  return plan(RunRole::level, std::max(1, answer_level())).setup;
+}
 ObservationWindows ControlledFilter::answer_windows() const {
   return plan(RunRole::level, answer_level()).windows;
 }

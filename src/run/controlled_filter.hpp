@@ -87,6 +87,8 @@ class ControlledFilter {
   Accuracy accuracy() const;
   /// The options of the answer.
   FilterSetup answer_setup() const;
+  /// The same, and before there is an answer those of level 1.
+  FilterSetup chosen_setup() const;
   /// The windows of the answer, to go through it again.
   ObservationWindows answer_windows() const;
   /// Warnings of the answer, then a sentence for an error above the tolerance or unknown; without "warning:".
