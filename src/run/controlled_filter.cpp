@@ -295,7 +295,9 @@ std::optional<ControlledFilter::Plan> ControlledFilter::next() const {
   // The best there will be: its guards, unless the work is spent.
   if (promising || work_ < control_.work)
     if (auto guard = next_guard(level - 1)) return guard;
-  if (!largest(errors_of(level)).within(control_.tolerance) && more) return plan(RunRole::level, level + 1);
+  // More nodes do nothing for what fixed steps leave.
+  if (!control_.steps && more && !largest(errors_of(level)).within(control_.tolerance))
+    return plan(RunRole::level, level + 1);
   return {};
 }
 
