@@ -144,6 +144,7 @@ void write_tree(const TreeArguments& a) {
     throw InputError("standard output takes one file only", "--graphml", "-");
   FilterArguments arguments = a.filter;
   if (!arguments.thin) arguments.thin = ThinningMethod::tbba;
+  if (!arguments.conditioning) arguments.conditioning = Conditioning::children;
   if (!arguments.nodes && arguments.thin != ThinningMethod::none) arguments.nodes = usual_nodes;
   if (a.horizon) model.observation = ObservationKind::none;
   const FilterSetup setup = filter_setup(arguments, model);

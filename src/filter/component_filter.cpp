@@ -105,9 +105,10 @@ void ComponentFilter::advance(const ObservationWindow& window) {
   const std::span<const double> y = window.observation;
   nonlinear_ = false;
   pilot_evidence_.reset();
+  clock_ = window.start;
   if (window.at_start) weigh(window, y, clock_);
   if (window.length() > 0) cross(window, window.at_start ? std::span<const double>() : y);
-  clock_ += window.length();
+  clock_ = window.end;
   if (!window.at_start) weigh(window, y, clock_);
   check_bounds(window.end);
   time_ = window.end;

@@ -152,7 +152,9 @@ ControlledFilter::Plan ControlledFilter::plan(RunRole role, int level) const {
 // An unpruned tree has no room for a formula of more paths.
 std::optional<CubatureFormula> ControlledFilter::other_formula() const {
   const int m = setup_.options.formula.degree;
-  if (setup_.options.formula.paths.empty()) return {};
+  // Components move by moment equations.
+  if (setup_.options.formula.paths.empty() || setup_.options.conditioning == Conditioning::components)
+    return {};
   return alone() ? formula_of_degree(m - 2, model_, control_.formulas)
                  : other_degree(m, model_, control_.formulas);
 }

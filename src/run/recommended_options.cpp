@@ -4,6 +4,8 @@
 #include <thread>
 
 #include "wienertree/cubature/catalogue.hpp"
+#include "wienertree/filter/component_filter.hpp"
+#include "wienertree/filter/small_matrix.hpp"
 
 namespace wienertree {
 namespace {
@@ -76,6 +78,19 @@ ThinningMethod recommended_thinning(const GivenOptions& given, FilterMethod meth
   return ThinningMethod::none;
 }
 
+Conditioning recommended_conditioning(const Model& model, const GivenOptions& given, FilterMethod method) {
+  if (given.conditioning) return *given.conditioning;
+  const bool own_way = given.prune_weights == PruneWeights::cubature || given.ess_threshold || given.degree ||
+                       given.formula || given.recombination_degree || given.flow || given.thin;
+  const std::size_t d = model.reported_dimension();
+  if (method != FilterMethod::klv || model.observation != ObservationKind::discrete || own_way)
+    return Conditioning::children;
+  const bool absorbs = std::ranges::any_of(
+      model.bounds, [](const StateBound& b) { return b.bounded() && b.boundary == Boundary::absorb; });
+  return d >= 2 && d <= std::size_t{most_component_states} && !absorbs ? Conditioning::components
+                                                                       : Conditioning::children;
+}
+
 FilterSetup recommended_options(const Model& model, const GivenOptions& given,
                                 const std::filesystem::path& formulas) {
   FilterSetup setup;
@@ -83,8 +98,11 @@ FilterSetup recommended_options(const Model& model, const GivenOptions& given,
   o.method = recommended_method(model, given);
   if (o.method == FilterMethod::klv && given.thin == ThinningMethod::none) o.method = FilterMethod::full_tree;
   o.thinning.method = recommended_thinning(given, o.method);
-  const std::size_t nodes =
-      given.nodes.value_or(recommended_nodes(o.method, o.thinning.method, model.reported_dimension()));
+  o.conditioning = recommended_conditioning(model, given, o.method);
+  const std::size_t d = model.reported_dimension();
+  const std::size_t nodes = given.nodes.value_or(o.conditioning == Conditioning::components
+                                                     ? default_components(d)
+                                                     : recommended_nodes(o.method, o.thinning.method, d));
   (o.method == FilterMethod::grid ? o.grid_points : o.nodes) = nodes;
   if (!keeps_nodes(o.method)) return setup;
   if (!moves_particles(o.method)) {

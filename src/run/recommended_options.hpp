@@ -18,6 +18,7 @@ struct GivenOptions {
   std::optional<SiteOrder> order;
   std::optional<PruneWeights> prune_weights;
   std::optional<FunctionalMethod> functional;
+  std::optional<Conditioning> conditioning;
   std::optional<FlowMethod> flow;
   std::optional<double> relative_tolerance, absolute_tolerance, ess_threshold, alpha, beta;
   std::optional<OnNodeFailure> on_node_failure;
@@ -42,6 +43,10 @@ bool moves_particles(FilterMethod method);
 FilterMethod recommended_method(const Model& model, const GivenOptions& given);
 /// The way to thin that the method uses unless another is given.
 ThinningMethod recommended_thinning(const GivenOptions& given, FilterMethod method);
+
+/// How the method takes in discrete observations unless a way is given: components of several states, where nothing is
+/// asked that only trees of nodes know.
+Conditioning recommended_conditioning(const Model& model, const GivenOptions& given, FilterMethod method);
 
 /// All options. @param formulas the directory of cubature formulas
 /// @throws InputError when there is no formula of the degree

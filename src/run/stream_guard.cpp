@@ -25,7 +25,9 @@ StreamGuard::StreamGuard(const Model& model, const FilterSetup& setup, const Con
   guards_.emplace_back(model, guard);
   guard.options.seed = seed + 2;
   if (random_) guards_.emplace_back(model, guard);
-  if (random_ || guard.options.formula.paths.empty()) return;
+  if (random_ || guard.options.formula.paths.empty() ||
+      guard.options.conditioning == Conditioning::components)
+    return;
   if (auto other = other_degree(guard.options.formula.degree, model, control.formulas)) {
     guard.options.formula = *std::move(other);
     guards_.emplace_back(model, guard);
