@@ -27,6 +27,9 @@ const Choices<PruneWeights> prunings = {{"likelihood", PruneWeights::likelihood}
 const Choices<FunctionalMethod> functionals = {{"picard", FunctionalMethod::picard},
                                                {"trapezoid", FunctionalMethod::trapezoid},
                                                {"second-order", FunctionalMethod::second_order}};
+const Choices<Conditioning> conditionings = {{"children", Conditioning::children},
+                                             {"families", Conditioning::families},
+                                             {"components", Conditioning::components}};
 const Choices<OnNodeFailure> failures = {{"stop", OnNodeFailure::stop}, {"drop", OnNodeFailure::drop}};
 
 // An option given where it means nothing is a mistake worth telling.
@@ -38,6 +41,7 @@ void refuse_tree_options(const FilterArguments& a, const std::string& reason) {
   refuse_if(a.degree.has_value(), "--degree", reason);
   refuse_if(a.formula_name.has_value(), "--formula", reason);
   refuse_if(a.prune_weights.has_value(), "--prune-weights", reason);
+  refuse_if(a.conditioning.has_value(), "--conditioning", reason);
   refuse_if(a.recombination_degree.has_value(), "--recombination-degree", reason);
   refuse_if(a.flow.has_value(), "--flow", reason);
   refuse_if(a.relative_tolerance.has_value(), "--rtol", reason);
@@ -58,6 +62,27 @@ void refuse_thinning_options(const FilterArguments& a, const std::string& reason
   refuse_random_options(a, reason);
 }
 
+// Conditioned families and components are for discrete observations, thinned with their likelihoods.
+void refuse_conditioning(const FilterArguments& a, const Model& model, FilterMethod method,
+                         ThinningMethod thin) {
+  if (!a.conditioning || a.conditioning == Conditioning::children) return;
+  const std::string chosen = "--conditioning " + name_of(conditionings, *a.conditioning);
+  refuse_if(method != FilterMethod::klv, chosen.c_str(),
+            thin == ThinningMethod::none ? "has no meaning with --thin none"
+                                         : "has no meaning with --method " + name_of(methods, method));
+  refuse_if(model.observation != ObservationKind::discrete, chosen.c_str(),
+            "has meaning only for discrete observations");
+  refuse_if(a.prune_weights == PruneWeights::cubature, chosen.c_str(),
+            "has no meaning with --prune-weights cubature, where likelihoods never decide");
+  refuse_if(a.ess_threshold.has_value(), "--ess-threshold",
+            "has no meaning with " + chosen + ", which lets likelihoods decide at every step");
+  const bool line = model.reported_dimension() == 1;
+  refuse_if(a.conditioning == Conditioning::families && !line, chosen.c_str(),
+            fmt::format("is for models of one state, and this one has {}", model.reported_dimension()));
+  refuse_if(a.conditioning == Conditioning::components && line, chosen.c_str(),
+            "is for models of several states; with one, families do the same");
+}
+
 void refuse_inapplicable(const FilterArguments& a, const Model& model, FilterMethod method,
                          ThinningMethod thin) {
   const std::string with_method = "has no meaning with --method " + name_of(methods, method);
@@ -70,6 +95,7 @@ void refuse_inapplicable(const FilterArguments& a, const Model& model, FilterMet
   refuse_if(a.beta && method != FilterMethod::gaussian_mixture, "--beta", with_method);
   refuse_if(a.functional && model.observation != ObservationKind::continuous, "--functional",
             "has meaning only for continuous observations");
+  refuse_conditioning(a, model, method, thin);
   if (moves_particles(method)) {
     refuse_tree_options(a, with_method);
     refuse_if(recombines(thin), "--thin",
@@ -120,6 +146,9 @@ void add_tree_options(CLI::App& app, FilterArguments& a) {
             "Moments that recombination keeps [by dimension]", 99);
   add_choice(app, "--prune-weights", a.prune_weights, prunings,
              "Weights that decide which nodes stay [likelihood]");
+  add_choice(app, "--conditioning", a.conditioning, conditionings,
+             "What a discrete observation conditions: children of nodes, their families, or components with "
+             "covariance [families for one state]");
   add_choice(app, "--functional", a.functional, functionals,
              "Likelihood of a step of a continuous observation [second-order]");
   add_choice(app, "--flow", a.flow, flows, "How nodes move along a path [auto]");
@@ -210,8 +239,10 @@ Json options_in_force(const FilterSetup& setup, const Model& model) {
     if (o.thinning.recombination_degree > 0) json["recombination-degree"] = o.thinning.recombination_degree;
   }
   if (o.method == FilterMethod::klv) json["prune-weights"] = name_of(prunings, o.prune_weights);
-  const bool likelihoods_decide =
-      o.method == FilterMethod::klv && setup.random && o.prune_weights == PruneWeights::likelihood;
+  if (o.method == FilterMethod::klv && model.observation == ObservationKind::discrete)
+    json["conditioning"] = name_of(conditionings, o.conditioning);
+  const bool likelihoods_decide = o.method == FilterMethod::klv && o.conditioning == Conditioning::children &&
+                                  setup.random && o.prune_weights == PruneWeights::likelihood;
   if (o.method == FilterMethod::euler || likelihoods_decide) json["ess-threshold"] = o.ess_threshold;
   if (o.method == FilterMethod::gaussian_mixture) {
     json["alpha"] = mixture_alpha(o);
@@ -230,6 +261,11 @@ Json options_in_force(const FilterSetup& setup, const Model& model) {
     json["launches"] = setup.launches;
   }
   return json;
+}
+
+std::optional<std::size_t> steps_in_force(const FilterSetup& setup, std::optional<std::uint64_t> given) {
+  if (given || setup.options.conditioning == Conditioning::children) return given;
+  return 0;
 }
 
 std::string describe(const FilterSetup& setup) {

@@ -40,6 +40,9 @@ ControlOptions control_options(const AccuracyArguments& accuracy, const FilterAr
 /// there is no formula of the degree
 FilterSetup filter_setup(const FilterArguments& arguments, const Model& model);
 
+/// The steps to cut a record into: those given, or one a gap where the filter chooses its own, or nothing.
+std::optional<std::size_t> steps_in_force(const FilterSetup& setup, std::optional<std::uint64_t> given);
+
 std::string method_name(FilterMethod method);
 
 /// Names and values of all options in force.

@@ -256,7 +256,8 @@ const ObservationPath& StudyData::observations(const StudyCell& cell, std::size_
 
 ObservationWindows StudyData::windows(const FilterCell& cell, const ObservationPath& path) const {
   const ObservationKind kind = cell.model->observation;
-  return {path, kind, cell.model->timing, cell.steps.value_or(default_steps(path, kind))};
+  return {path, kind, cell.model->timing,
+          steps_in_force(cell.setup, cell.steps).value_or(default_steps(path, kind))};
 }
 
 StudyTruth StudyData::filter_truth(const StudyCell& cell, std::size_t path) {

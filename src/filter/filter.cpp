@@ -7,6 +7,7 @@
 #include "wienertree/filter/benes_filter.hpp"
 #include "wienertree/filter/component_filter.hpp"
 #include "wienertree/filter/euler_filter.hpp"
+#include "wienertree/filter/family_filter.hpp"
 #include "wienertree/filter/filter_memory.hpp"
 #include "wienertree/filter/gaussian_mixture_filter.hpp"
 #include "wienertree/filter/grid_filter.hpp"
@@ -83,6 +84,24 @@ void check_mixture_options(const FilterOptions& options) {
     throw InputError("must be a number of at least 0", "beta", fmt::format("{}", options.beta));
 }
 
+void check_family_options(const Model& model, const FilterOptions& options) {
+  check_tree_options(model, options);
+  if (model.reported_dimension() != 1)
+    throw InputError("families are conditioned in one dimension", "conditioning",
+                     fmt::format("{} states", model.reported_dimension()));
+  if (model.observation == ObservationKind::continuous)
+    throw InputError("families are conditioned on discrete observations", "conditioning", "families");
+  if (options.thinning.method == ThinningMethod::none)
+    throw InputError("families are thinned between observations", "thin", "none");
+  if (options.prune_weights != PruneWeights::likelihood)
+    throw InputError("likelihoods always decide about conditioned families", "prune-weights", "cubature");
+  if (options.ess_threshold < 1)
+    throw InputError("likelihoods decide about conditioned families at every step", "ess-threshold",
+                     fmt::format("{}", options.ess_threshold));
+  if (!(options.substep_tolerance > 0))
+    throw InputError("must be positive", "substep tolerance", fmt::format("{}", options.substep_tolerance));
+}
+
 }  // namespace
 
 std::unique_ptr<Functional> make_functional(const FilterOptions& options) {
@@ -123,6 +142,10 @@ std::unique_ptr<Filter> make_filter(const Model& model, const FilterOptions& opt
       if (options.conditioning == Conditioning::components) {
         check_component_options(model, options);
         return std::make_unique<ComponentFilter>(model, options);
+      }
+      if (options.conditioning == Conditioning::families) {
+        check_family_options(model, options);
+        return std::make_unique<FamilyFilter>(model, options);
       }
       check_tree_options(model, options);
       return std::make_unique<KlvFilter>(model, options);

@@ -80,15 +80,18 @@ ThinningMethod recommended_thinning(const GivenOptions& given, FilterMethod meth
 
 Conditioning recommended_conditioning(const Model& model, const GivenOptions& given, FilterMethod method) {
   if (given.conditioning) return *given.conditioning;
-  const bool own_way = given.prune_weights == PruneWeights::cubature || given.ess_threshold || given.degree ||
-                       given.formula || given.recombination_degree || given.flow || given.thin;
-  const std::size_t d = model.reported_dimension();
-  if (method != FilterMethod::klv || model.observation != ObservationKind::discrete || own_way)
+  const bool carried = given.prune_weights == PruneWeights::cubature || given.ess_threshold;
+  if (method != FilterMethod::klv || model.observation != ObservationKind::discrete || carried)
     return Conditioning::children;
+  const std::size_t d = model.reported_dimension();
+  // Families grow by the formula, the flow and the thinning that are given; components by none of them.
+  if (d == 1) return Conditioning::families;
+  const bool own_way =
+      given.degree || given.formula || given.recombination_degree || given.flow || given.thin;
   const bool absorbs = std::ranges::any_of(
       model.bounds, [](const StateBound& b) { return b.bounded() && b.boundary == Boundary::absorb; });
-  return d >= 2 && d <= std::size_t{most_component_states} && !absorbs ? Conditioning::components
-                                                                       : Conditioning::children;
+  return d <= std::size_t{most_component_states} && !own_way && !absorbs ? Conditioning::components
+                                                                         : Conditioning::children;
 }
 
 FilterSetup recommended_options(const Model& model, const GivenOptions& given,

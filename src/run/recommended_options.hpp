@@ -44,8 +44,8 @@ FilterMethod recommended_method(const Model& model, const GivenOptions& given);
 /// The way to thin that the method uses unless another is given.
 ThinningMethod recommended_thinning(const GivenOptions& given, FilterMethod method);
 
-/// How the method takes in discrete observations unless a way is given: components of several states, where nothing is
-/// asked that only trees of nodes know.
+/// How the method takes in discrete observations unless a way is given: families of one state, components of several
+/// where nothing is asked that only trees of nodes know.
 Conditioning recommended_conditioning(const Model& model, const GivenOptions& given, FilterMethod method);
 
 /// All options. @param formulas the directory of cubature formulas
