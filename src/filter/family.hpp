@@ -10,12 +10,13 @@ namespace wienertree {
 
 /// Shape of a law of mean 0 and variance 1, as the map of a standard normal z
 ///
-///     u(z) = a z + c (z^2 - 1) + d (z^3 - 3 z),     c = k3/6,  d = k4/24 - k3^2/18,  a = sqrt(1 - 2 c^2 - 6 d^2),
+///     u(z) = a z + c (z^2 - 1) + d (z^3 - 3 z),
+///     c = k3/6,   d = k4/24 - k3^2/18,   a = sqrt(1 - 2 c^2 - 6 d^2),
 ///
-/// the expansion of Cornish and Fisher (1937, Rev. Inst. Int. Stat. 5, 307-320) to second order in skewness k3 and
-/// first in excess kurtosis k4. Its density is positive everywhere, which the series of Gram and Charlier does not
-/// promise. Beyond |z| = 4 the map goes on along its tangents. c and d are lowered together where its slope would
-/// fall below 0.2, so that u increases.
+/// the expansion of Cornish and Fisher (1937, Rev. Inst. Int. Stat. 5, 307-320) to second order in skewness
+/// k3 and first in excess kurtosis k4. Its density is positive everywhere, which the series of Gram and
+/// Charlier does not promise. Beyond |z| = 4 the map goes on along its tangents. c and d are lowered together
+/// where its slope would fall below 0.2, so that u increases.
 struct FamilyShape {
   static constexpr double reach = 4;
   double a = 1, c = 0, d = 0;
@@ -32,8 +33,8 @@ struct FamilyShape {
   double inverse(double u) const;
 };
 
-/// A measure sum_i exp(log_weight_i) law(mean_i + sd_i u_i(z)), z standard normal, as a structure of arrays. A
-/// family of sd 0 is a point.
+/// A measure sum_i exp(log_weight_i) law(mean_i + sd_i u_i(z)), z standard normal, as a structure of arrays.
+/// A family of sd 0 is a point.
 struct Families {
   std::vector<double> log_weight, mean, sd;
   std::vector<FamilyShape> shape;  ///< one for each, or empty: all Gaussian

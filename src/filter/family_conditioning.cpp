@@ -77,7 +77,8 @@ bool FamilyConditioning::concave(const HermiteRule& rule, std::span<const double
   return true;
 }
 
-// ratio_ becomes log of exp(g) / N(mu, s^2) at the points, but for the constant log s that is added where it is used.
+// ratio_ becomes log of exp(g) / N(mu, s^2) at the points, but for the constant log s that is added where it
+// is used.
 FamilyConditioning::Fit FamilyConditioning::examine(const Families& prior, const HermiteRule& rule,
                                                     Active& active, std::span<const double> F, int pass) {
   const std::size_t n = rule.size();
@@ -103,8 +104,8 @@ FamilyConditioning::Fit FamilyConditioning::examine(const Families& prior, const
   const bool resolved = std::abs(last) <= unresolved * sum && std::abs(before_last) <= unresolved * sum;
   if (resolved && (prior.size() > 1 || pass > 0)) return Fit::accepted;
   if (pass == most_passes || (pass == 0 && !likelihood_.quadratic() && !concave(rule, F))) return Fit::hard;
-  // F = .. + b z~ + e (z~^2 - 1)/sqrt 2 + .. in the points z~ of the rule; the next Gaussian has the precision
-  // s^2 - sqrt(2) e and the slope b - mu s there.
+  // F = .. + b z~ + e (z~^2 - 1)/sqrt 2 + .. in the points z~ of the rule; the next Gaussian has the
+  // precision s^2 - sqrt(2) e and the slope b - mu s there.
   double b = 0, e = 0;
   for (std::size_t j = 0; j < n; ++j) {
     b += rule.first[j] * F[j];

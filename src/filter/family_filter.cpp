@@ -109,8 +109,8 @@ void FamilyFilter::take_in(const ObservationWindow& window) {
     conditioning_.condition(families_, window, clock_, 2 * options_.nodes, update_);
   };
   condition();
-  // One Gaussian is conditioned exactly by quadrature; its pieces show the shape of the law that comes out, as long as
-  // it lies where they do.
+  // One Gaussian is conditioned exactly by quadrature; its pieces show the shape of the law that comes out,
+  // as long as it lies where they do.
   constexpr double reach = 5;
   if (single_ && !update_.quadratic && families_.sd[0] > 0 && update_.far < reach) {
     split_start();
@@ -126,9 +126,9 @@ void FamilyFilter::take_in(const ObservationWindow& window) {
   has_points_ = true;
 }
 
-// N(m, P) = sum_k w_k N(m + sd k/4, P/16), |k| <= 28, w_k proportional to exp(-(k/4)^2 / (2 15/16)): its Gaussians are
-// narrow enough for a likelihood that is not quadratic. The sum over k in place of an integral changes nothing that a
-// double shows.
+// N(m, P) = sum_k w_k N(m + sd k/4, P/16), |k| <= 28, w_k proportional to exp(-(k/4)^2 / (2 15/16)): its
+// Gaussians are narrow enough for a likelihood that is not quadratic. The sum over k in place of an integral
+// changes nothing that a double shows.
 void FamilyFilter::split_start() {
   constexpr int most = 28;
   const double m = families_.mean[0], sd = families_.sd[0];
@@ -303,7 +303,7 @@ void FamilyFilter::move_by_tree(const ObservationWindow& window) {
   const double gap = window.length();
   thin(window, law_, 0, gap);
   const double rate = relaxation_rate();
-  double longest = rate > 0 ? options_.substep_tolerance / rate : infinity;
+  double longest = rate > 0 ? tolerance() / rate : infinity;
   if (gap / longest > most_steps) {
     longest = gap / most_steps;
     if (longest * rate > 0.5)
@@ -354,16 +354,15 @@ void FamilyFilter::grow(const ObservationWindow& window, double step) {
   failures_.clear();
 }
 
-// Steps are halved until the families from the present nodes are Gaussian to the tolerance. The step at which they
-// just are is interpolated, so that it changes continuously with the law. Where it is the whole gap, families_ and
-// children_ are those of this step.
+// Steps are halved until the families from the present nodes are Gaussian to the tolerance. The step at which
+// they just are is interpolated, so that it changes continuously with the law. Where it is the whole gap,
+// families_ and children_ are those of this step.
 double FamilyFilter::choose_last_step(const ObservationWindow& window, double longest) {
   constexpr int most_halvings = 6;
   double step = std::min(window.length(), longest), before = 0;
   for (int k = 0;; ++k, step /= 2) {
     grow(window, step);
-    const double excess =
-        families_of(nodes_, children_, options_.formula, families_) / options_.substep_tolerance;
+    const double excess = families_of(nodes_, children_, options_.formula, families_) / tolerance();
     if (excess <= 1) {
       if (k == 0) return step;
       return step * std::exp2(-std::log(excess) / std::log(before / excess));

@@ -1,20 +1,21 @@
 #pragma once
-/// The KLV filter of a signal on the line seen at discrete times, with families conditioned on each observation.
+/// The KLV filter of a signal on the line seen at discrete times, with families conditioned on each
+/// observation.
 ///
-/// Between two observations the tree of cubature paths grows over a few steps, thinned after each but the last. The
-/// children of a node over the last step, its family, stand for a law that is near Gaussian when the step is short:
-/// N(m_i, C_i) corrected by skewness and kurtosis. It is this law that the observation conditions, and not the
-/// children: noise much narrower than a step does no harm. The length of the last step is chosen so that the root
-/// mean square of skewness and kurtosis over the families is at most a tolerance, whatever the noise; steps before
-/// it are graded (family_substeps.hpp). The posterior is the sum of the conditioned families, and its quadrature
-/// points, thinned, are the nodes of the next gap.
+/// Between two observations the tree of cubature paths grows over a few steps, thinned after each but the
+/// last. The children of a node over the last step, its family, stand for a law that is near Gaussian when
+/// the step is short: N(m_i, C_i) corrected by skewness and kurtosis. It is this law that the observation
+/// conditions, and not the children: noise much narrower than a step does no harm. The length of the last
+/// step is chosen so that the root mean square of skewness and kurtosis over the families is at most a
+/// tolerance, whatever the noise; steps before it are graded (family_substeps.hpp). The posterior is the sum
+/// of the conditioned families, and its quadrature points, thinned, are the nodes of the next gap.
 ///
-/// Recombination puts nodes no farther apart than families spread in the time that is left (overlapping_nodes.hpp),
-/// N of them or more.
+/// Recombination puts nodes no farther apart than families spread in the time that is left
+/// (overlapping_nodes.hpp), N of them or more.
 ///
-/// Where drift and sensor are affine, noise Gaussian and the start Gaussian or fixed, one family is carried by its own
-/// moments, and this is Kalman's filter. Where only drift and diffusion are so, nodes have Gaussian families over the
-/// whole gap, and no path is grown.
+/// Where drift and sensor are affine, noise Gaussian and the start Gaussian or fixed, one family is carried
+/// by its own moments, and this is Kalman's filter. Where only drift and diffusion are so, nodes have
+/// Gaussian families over the whole gap, and no path is grown.
 #include "wienertree/filter/family_conditioning.hpp"
 #include "wienertree/filter/filter.hpp"
 #include "wienertree/filter/line_transition.hpp"
@@ -25,8 +26,8 @@ namespace wienertree {
 
 class FamilyFilter final : public Filter {
  public:
-  /// @throws InputError unless the model has one state (and perhaps a clock) and is seen at discrete times or not
-  /// at all, and likelihoods decide at every step
+  /// @throws InputError unless the model has one state (and perhaps a clock) and is seen at discrete times or
+  /// not at all, and likelihoods decide at every step
   FamilyFilter(const Model& model, const FilterOptions& options);
   void advance(const ObservationWindow& window) override;
   const Posterior& posterior() override;
@@ -48,6 +49,9 @@ class FamilyFilter final : public Filter {
   bool move_by_transition(const ObservationWindow& window);
   void move_by_tree(const ObservationWindow& window);
   double relaxation_rate();
+  /// Of the root mean squares of skewness and excess kurtosis over the last step, and of the longest step in
+  /// units of 1/|dV_0/dx|.
+  double tolerance() const { return 0.5 * options_.substep_tolerance; }
   void grow(const ObservationWindow& window, double step);
   double choose_last_step(const ObservationWindow& window, double longest);
   void thin(const ObservationWindow& window, const Generation& from, std::size_t parents, double left);

@@ -15,9 +15,11 @@ class FamilyLikelihood {
   /// The model is kept by reference. @pre one state, and a clock if the model has one
   explicit FamilyLikelihood(const Model& model) : model_(model) {}
 
-  /// @param clock the time that the model's clock shows  @param window whose observation it is; without one F = 0
+  /// @param clock the time that the model's clock shows
+  /// @param window whose observation it is; without one F = 0
   void observe(const ObservationWindow& window, double clock);
-  /// The observation is affine in the state, with Gaussian noise: F is quadratic wherever a family is Gaussian.
+  /// The observation is affine in the state, with Gaussian noise: F is quadratic wherever a family is
+  /// Gaussian.
   bool quadratic() const;
   /// Points that `evaluate` takes; to be filled by the caller.
   std::span<double> places(std::size_t count);

@@ -89,8 +89,8 @@ void FamilyModes::extend(int side) {
   }
 }
 
-// Records the maxima inside (low, high): those of 9 points, each enclosed again between its neighbours. The ends
-// count only where the grid ends.
+// Records the maxima inside (low, high): those of 9 points, each enclosed again between its neighbours. The
+// ends count only where the grid ends.
 void FamilyModes::enclose(double low, double high, int depth) {
   constexpr std::size_t parts = 8;
   std::array<double, parts + 1> z, g;

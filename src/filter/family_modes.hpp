@@ -9,13 +9,13 @@
 namespace wienertree {
 
 /// For g(z) = F(z) - z^2/2 of one family (family_conditioning.hpp):
-/// - modes: on a grid of -9 .. 9 with spacing 1/4, which goes on geometrically where g is largest at its end, every
-///   local maximum is enclosed ever closer, by 9 points at a time, until g varies by less than 1/2 over the bracket,
-///   of half width delta;
-/// - quadrature: of the modes within 45 of the largest, intervals with ends at mode +- 3^k delta are halved until
-///   Gauss-Legendre quadrature of 8 points changes by less than 1e-9 of the whole.
-/// A point where the density is not a number counts as zero unless it is the family's mean: tails of a family may
-/// reach beyond the domain of a model.
+/// - modes: on a grid of -9 .. 9 with spacing 1/4, which goes on geometrically where g is largest at its end,
+///   every local maximum is enclosed ever closer, by 9 points at a time, until g varies by less than 1/2 over
+///   the bracket, of half width delta;
+/// - quadrature: of the modes within 45 of the largest, intervals with ends at mode +- 3^k delta are halved
+///   until Gauss-Legendre quadrature of 8 points changes by less than 1e-9 of the whole.
+/// A point where the density is not a number counts as zero unless it is the family's mean: tails of a family
+/// may reach beyond the domain of a model.
 class FamilyModes {
  public:
   /// What belongs to one mode, or to several without a valley of a depth of log 2 between them.

@@ -113,9 +113,8 @@ struct FilterOptions {
   FunctionalMethod functional = FunctionalMethod::second_order;
   Conditioning conditioning = Conditioning::children;
   /// Families and components: how far from Gaussian (skewness, excess kurtosis; in d > 1 the non-affine part of the
-  /// drift in standard deviations of a family) the law of a family may be over the last substep before an observation;
-  /// families: also the longest substep, in units of 1/|dV_0/dx|.
-  double substep_tolerance = 0.05;
+  /// drift in standard deviations of a family) the law of a family may be over the last substep before an observation.
+  double substep_tolerance = 0.1;
   /// A likelihood of the caller's in place of `functional`; made once for each filter.
   std::function<std::unique_ptr<Functional>()> own_functional = {};
   /// Random thinning lets likelihoods decide when their effective sample size is at most this fraction F of

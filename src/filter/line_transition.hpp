@@ -1,6 +1,6 @@
 #pragma once
-/// The exact transition of a signal on the line whose drift is affine and whose diffusion does not depend on the
-/// state, both of which may depend on time.
+/// The exact transition of a signal on the line whose drift is affine and whose diffusion does not depend on
+/// the state, both of which may depend on time.
 #include <optional>
 #include <vector>
 
@@ -17,14 +17,16 @@ struct LineTransition {
 ///
 ///     F' = A F,   f' = A f + a,   Q' = 2 A Q + |sigma|^2,     F = 1, f = Q = 0 at the start;
 ///
-/// in closed form where the fields are known to be affine, else (a clock, or fields that were not analysed) by the
-/// classical Runge-Kutta method with steps halved until F, f and Q change by less than 1e-10 of themselves.
+/// in closed form where the fields are known to be affine, else (a clock, or fields that were not analysed)
+/// by the classical Runge-Kutta method with steps halved until F, f and Q change by less than 1e-10 of
+/// themselves.
 class AffineLine {
  public:
   /// The model is kept by reference. @pre one state, and a clock if the model has one
   explicit AffineLine(const Model& model);
-  /// Over [0, length] from the clock's `time`, for states within [low, high]: nothing where drift or diffusion are
-  /// not affine and constant there (to 1e-10 of their size, at seven places and five times), or a state is bounded.
+  /// Over [0, length] from the clock's `time`, for states within [low, high]: nothing where drift or
+  /// diffusion are not affine and constant there (to 1e-10 of their size, at seven places and five times), or
+  /// a state is bounded.
   std::optional<LineTransition> transition(double time, double length, double low, double high);
 
  private:

@@ -8,7 +8,9 @@ namespace wienertree {
 namespace {
 
 constexpr std::size_t nodes_a_patch = 6, most_nodes = 512;
-constexpr double widest = 6;  // of a patch in xi
+constexpr double widest = 6;                // of a patch in xi that has all the mass
+constexpr double least_share = 1.0 / 4096;  // 2^-12: the widest patch is 12
+constexpr double tail = 1e-40;              // of the mass: 13 standard deviations of a Gaussian
 
 }  // namespace
 
@@ -40,38 +42,77 @@ void OverlappingNodes::reduce(std::size_t first, std::size_t last) {
   }
 }
 
-void OverlappingNodes::thin(const Generation& from, std::span<const double> spread, std::size_t nodes,
-                            Generation& out) {
+// Ends of patches of points first .. last-1.
+void OverlappingNodes::cut(std::size_t first, std::size_t last, double width) {
+  const auto power_12 = [](double v) {
+    const double square = v * v, fourth = square * square;
+    return fourth * fourth * fourth;
+  };
+  const double most = power_12(width);
+  while (first < last) {
+    double mass = weight_[first];
+    std::size_t end = first + 1;
+    for (; end < last; ++end) {
+      const double share = std::max(mass + weight_[end], least_share);
+      if (power_12(xi_[end] - xi_[first]) * share > most) break;
+      mass += weight_[end];
+    }
+    end_.push_back(end);
+    first = end;
+  }
+}
+
+// Points sorted by place, the weight of each relative to the whole, and xi.
+void OverlappingNodes::sort(const Generation& from, std::span<const double> spread) {
   constexpr double infinity = std::numeric_limits<double>::infinity();
   points_.clear();
-  double most = 0;
+  double most = 0, largest = -infinity, sum = 0;
   for (const double s : spread) most = s > most && s < infinity ? s : most;
-  for (std::size_t n = 0; n < from.size(); ++n)
-    if (from.log_weight[n] > -infinity)
-      points_.push_back(
-          {from.states(0, n), from.log_weight[n], spread[n] >= 1e-3 * most ? spread[n] : 1e-3 * most});
+  if (!(most > 0)) most = 1;  // without noise only the number of nodes counts
+  for (std::size_t n = 0; n < from.size(); ++n) {
+    if (!(from.log_weight[n] > -infinity)) continue;
+    points_.push_back(
+        {from.states(0, n), from.log_weight[n], spread[n] >= 1e-3 * most ? spread[n] : 1e-3 * most});
+    largest = std::max(largest, from.log_weight[n]);
+  }
   std::sort(points_.begin(), points_.end(), [](const Point& a, const Point& b) {
     return a.x < b.x || (a.x == b.x && a.log_weight < b.log_weight);
   });
+  weight_.resize(points_.size());
   xi_.assign(points_.size(), 0.0);
+  for (std::size_t k = 0; k < points_.size(); ++k)
+    sum += weight_[k] = std::exp(points_[k].log_weight - largest);
+  for (double& w : weight_) w /= sum;
   for (std::size_t k = 1; k < points_.size(); ++k)
     xi_[k] = xi_[k - 1] + 2 * (points_[k].x - points_[k - 1].x) / (points_[k].spread + points_[k - 1].spread);
-  // Without any noise only the number of nodes counts.
-  const double range = most > 0 ? xi_.back() : 0;
-  const auto fewest = static_cast<double>(std::max<std::size_t>(1, nodes / nodes_a_patch));
-  const auto patches = std::clamp(std::ceil(range / widest), fewest,
-                                  std::max(fewest, static_cast<double>(most_nodes / nodes_a_patch)));
-  if (!(most > 0))
-    for (std::size_t k = 0; k < xi_.size(); ++k) xi_[k] = points_[k].x - points_[0].x;
-  const double width = xi_.back() / patches;
+}
+
+void OverlappingNodes::thin(const Generation& from, std::span<const double> spread, std::size_t nodes,
+                            Generation& out) {
+  sort(from, spread);
+  const std::size_t N = points_.size();
+  std::size_t first = 0, last = N;
+  for (double mass = 0; first < N && (mass += weight_[first]) < tail; ++first) continue;
+  for (double mass = 0; last > first && (mass += weight_[last - 1]) < tail; --last) continue;
+  const double fewest = static_cast<double>(std::max<std::size_t>(1, nodes / nodes_a_patch));
+  const double most = std::max(fewest, static_cast<double>(most_nodes / nodes_a_patch));
+  double width = widest;
+  for (int k = 0; k < 8; ++k) {
+    end_.clear();
+    if (first > 0) end_.push_back(first);
+    cut(first, last, width);
+    if (last < N) end_.push_back(N);
+    const auto patches = static_cast<double>(end_.size());
+    if (patches > most)
+      width *= 1.2 * patches / most;
+    else if (patches < fewest && N > nodes)
+      width *= 0.9 * patches / fewest;
+    else
+      break;
+  }
   x_.clear();
   log_weight_.clear();
-  for (std::size_t first = 0, last = 0; first < points_.size(); first = last) {
-    const double patch = width > 0 ? std::min(std::floor(xi_[first] / width), patches - 1) : 0;
-    for (last = first + 1; last < points_.size(); ++last)
-      if (width > 0 && std::min(std::floor(xi_[last] / width), patches - 1) != patch) break;
-    reduce(first, last);
-  }
+  for (std::size_t k = 0; k < end_.size(); ++k) reduce(k == 0 ? 0 : end_[k - 1], end_[k]);
   out.time = from.time;
   out.states.reshape(from.states.components(), x_.size());
   std::copy(x_.begin(), x_.end(), out.states.component(0).begin());

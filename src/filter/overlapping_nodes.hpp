@@ -8,15 +8,21 @@
 
 namespace wienertree {
 
-/// Patches of equal width in xi = int dx / s(x), where s(x) is the standard deviation that the family of a node at x
-/// will have: each becomes its Gauss quadrature of 6 nodes, which keeps its moments to degree 11. What is integrated
-/// later, a smooth function convolved with families, is analytic on the scale of s. Patches are 6 s wide at most (nodes
-/// then lie about s apart, and a sum of Gaussians one standard deviation apart ripples by 2 exp(-2 pi^2) = 5e-9 of its
-/// density), and narrower where that leaves fewer than N nodes; at most 512 nodes whatever the width.
+/// Patches in xi = int dx / s(x), where s(x) is the standard deviation that the family of a node at x will
+/// have: each becomes its Gauss quadrature of 6 nodes, which keeps its moments to degree 11. What is integrated
+/// later, a smooth function convolved with families, is analytic on the scale of s: the error of a patch goes
+/// with mass * width^12. Patches are such that
+///
+///     width (mass / whole)^{1/12} <= 6,
+///
+/// and at most 12 wide: nodes then lie about s apart where the mass is, and a sum of Gaussians that are one
+/// standard deviation apart ripples by 2 exp(-2 pi^2) = 5e-9 of its density. The tails beyond 1e-40 of the mass
+/// are a patch each. Patches are made narrower where that leaves fewer than N nodes, and wider where it makes
+/// more than 512.
 class OverlappingNodes {
  public:
-  /// @param from points with log-weights; further components are constant  @param spread s > 0 at each, or 0 where
-  /// there is no noise, which counts as a thousandth of the largest
+  /// @param from points with log-weights; further components are constant  @param spread s > 0 at each, or 0
+  /// where there is no noise, which counts as a thousandth of the largest
   /// @param nodes N  @param out states and log-weights of the nodes, ascending
   void thin(const Generation& from, std::span<const double> spread, std::size_t nodes, Generation& out);
 
@@ -24,10 +30,13 @@ class OverlappingNodes {
   struct Point {
     double x, log_weight, spread;
   };
+  void sort(const Generation& from, std::span<const double> spread);
+  void cut(std::size_t first, std::size_t last, double width);
   void reduce(std::size_t first, std::size_t last);
 
   std::vector<Point> points_;
-  std::vector<double> xi_, z_, w_, x_, log_weight_;
+  std::vector<std::size_t> end_;  ///< of patches
+  std::vector<double> weight_, xi_, z_, w_, x_, log_weight_;
   recombination::DiscreteGauss gauss_;
 };
 

@@ -84,8 +84,9 @@ TEST_CASE("a linear model is Kalman's, whatever the noise, the prior, the gaps, 
   const Model model = line_model(
       "0.2 - 0.5*x", "0.8", "h = [\"0.7*x - 0.1\"]\n" + gaussian_noise(sd) + "\ntiming = \"" + timing + "\"",
       prior > 0 ? fmt::format("[initial]\nmean = [0.3]\ncovariance = [[{}]]", prior) : "");
-  // Missing rows, a gap of 500 relaxation times, a value 30 standard deviations off. 1e-7: the covariances are squares
-  // of standard deviations that are known to 1e-16 of the largest of 1e3 before it is conditioned to 1e-4.
+  // Missing rows, a gap of 500 relaxation times, a value 30 standard deviations off. 1e-7: the covariances
+  // are squares of standard deviations that are known to 1e-16 of the largest of 1e3 before it is conditioned
+  // to 1e-4.
   ObservationPath path =
       record({0, 0.2, 0.4, 1.0, 1000, 1000.1, 1000.5, 1002}, {0.1, 0.4, missing, -0.5, 1.1, 0.9, 30, 0.2});
   if (timing == "previous") path.values[0] = missing;
@@ -95,7 +96,8 @@ TEST_CASE("a linear model is Kalman's, whatever the noise, the prior, the gaps, 
 TEST_CASE("a forcing that depends on time leaves a linear signal exact") {
   const Model clocked =
       line_model("-0.4*x + 0.8*sin(2*pi*t/7)", "0.5*(1 + 0.3*cos(t))", "h = [\"x\"]\n" + gaussian_noise(0.4));
-  // The same as a closed form: m' = -0.4 m + 0.8 sin(w t), P' = -0.8 P + 0.25 (1 + 0.3 cos t)^2, between observations.
+  // The same as a closed form: m' = -0.4 m + 0.8 sin(w t), P' = -0.8 P + 0.25 (1 + 0.3 cos t)^2, between
+  // observations.
   const ObservationPath path = record({0, 1.3, 2, 5}, {missing, 0.9, missing, -0.4});
   const auto antiderivative = [](double a, double w, double t) {  // of exp(a t) sin(w t)
     return std::exp(a * t) * (a * std::sin(w * t) - w * std::cos(w * t)) / (a * a + w * w);
@@ -156,8 +158,8 @@ TEST_CASE("a state-dependent diffusion under noise of any width") {
   CHECK(std::abs(p.log_evidence - oracle.log_evidence()) < 0.01);
   CHECK(std::abs(mean(p, 0) - m) < 0.01 * deviation);
   CHECK(std::abs(sd_of(p) - deviation) < 0.01 * deviation);
-  // The cost does not depend on the noise: in each of 10 gaps 7 steps are tried and 17 taken, of 6 children from some
-  // 120 nodes that overlap.
+  // The cost does not depend on the noise: in each of 10 gaps 7 steps are tried and 17 taken, of 6 children
+  // from some 120 nodes that overlap.
   CHECK(filter->statistics().children < 10 * 24 * 120 * 6);
 }
 

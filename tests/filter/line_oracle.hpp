@@ -1,6 +1,6 @@
 #pragma once
-/// A filter on the line by quadrature, for signals whose transition is Gaussian in some coordinate z: the oracle of
-/// conditioned families.
+/// A filter on the line by quadrature, for signals whose transition is Gaussian in some coordinate z: the
+/// oracle of conditioned families.
 #include <cmath>
 #include <functional>
 #include <numbers>
@@ -14,8 +14,9 @@ struct GaussianStep {
   double F, f, Q;
 };
 
-/// Trapezoidal rule on intervals that hold all but e^-40 of each posterior: for densities that are analytic and vanish
-/// at the ends of an interval it converges geometrically, and 600 points on 20 standard deviations are exact to 1e-12.
+/// Trapezoidal rule on intervals that hold all but e^-40 of each posterior: for densities that are analytic
+/// and vanish at the ends of an interval it converges geometrically, and 600 points on 20 standard deviations
+/// are exact to 1e-12.
 class LineOracle {
  public:
   using Intervals = std::vector<std::pair<double, double>>;
@@ -31,7 +32,8 @@ class LineOracle {
       moved_ = true;
     }
   }
-  /// @param likelihood log p(y | z)  @param where intervals outside which likelihood or prediction are negligible
+  /// @param likelihood log p(y | z)  @param where intervals outside which likelihood or prediction are
+  /// negligible
   void observe(const std::function<double(double)>& likelihood, const Intervals& where) {
     constexpr std::size_t points = 600;
     std::vector<double> z, log_mass;
