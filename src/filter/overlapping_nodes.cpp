@@ -8,9 +8,8 @@ namespace wienertree {
 namespace {
 
 constexpr std::size_t nodes_a_patch = 6, most_nodes = 512;
-constexpr double widest = 6;                // of a patch in xi that has all the mass
-constexpr double least_share = 1.0 / 4096;  // 2^-12: the widest patch is 12
-constexpr double tail = 1e-40;              // of the mass: 13 standard deviations of a Gaussian
+constexpr double widest = 6;    // of a patch in xi
+constexpr double tail = 1e-40;  // of the mass: 13 standard deviations of a Gaussian
 
 }  // namespace
 
@@ -44,19 +43,9 @@ void OverlappingNodes::reduce(std::size_t first, std::size_t last) {
 
 // Ends of patches of points first .. last-1.
 void OverlappingNodes::cut(std::size_t first, std::size_t last, double width) {
-  const auto power_12 = [](double v) {
-    const double square = v * v, fourth = square * square;
-    return fourth * fourth * fourth;
-  };
-  const double most = power_12(width);
   while (first < last) {
-    double mass = weight_[first];
     std::size_t end = first + 1;
-    for (; end < last; ++end) {
-      const double share = std::max(mass + weight_[end], least_share);
-      if (power_12(xi_[end] - xi_[first]) * share > most) break;
-      mass += weight_[end];
-    }
+    while (end < last && xi_[end] - xi_[first] <= width) ++end;
     end_.push_back(end);
     first = end;
   }
