@@ -105,6 +105,8 @@ std::string show_model(const std::string& name, const Assignments& parameters) {
   text += fmt::format("\nflow of a node: {}\nexact filter: {}{}\n",
                       a.has_exact_flow ? "in closed form" : "by an ODE solver", a.exact_filter_name,
                       a.exact_filter_reason.empty() ? "" : " (" + a.exact_filter_reason + ")");
+  if (a.square_roots.empty()) text += fmt::format("exact transition: none ({})\n", a.square_roots_reason);
+  for (const std::string& line : a.square_roots) text += fmt::format("exact transition: {}\n", line);
   return text;
 }
 

@@ -10,6 +10,8 @@
 #include "formula_choice.hpp"
 #include "tree_choices.hpp"
 #include "wienertree/cubature/lie_formula.hpp"
+#include "wienertree/tree/square_root_transition.hpp"
+#include "wienertree/weak/conditional_price.hpp"
 
 namespace wienertree::app {
 namespace {
@@ -19,6 +21,7 @@ const Choices<KinkTreatment> treatments = {{"auto", KinkTreatment::automatic},
                                            {"kernel", KinkTreatment::kernel},
                                            {"sharp", KinkTreatment::sharp}};
 const Choices<GridKind> grids = {{"uniform", GridKind::uniform}, {"kusuoka", GridKind::kusuoka}};
+const Choices<bool> square_root_choices = {{"auto", true}, {"off", false}};
 constexpr const char* discount_name = "discount_integral";
 
 void add_texts(CLI::App& app, const std::string& name, std::vector<std::string>& target,
@@ -143,6 +146,9 @@ void add_weak_options(CLI::App& app, WeakArguments& a) {
   add_count(app, "--recombination-degree", a.recombination_degree, 1,
             "Moments that recombination keeps [by dimension]", 99);
   add_choice(app, "--flow", a.flow, flows, "How nodes move along a path [auto]");
+  add_choice(
+      app, "--square-roots", a.square_roots, square_root_choices,
+      "Square-root processes and Heston's price by their exact transition [auto, where they are recognised]");
   add_number(app, "--rtol", a.relative_tolerance, Sign::positive, "Relative tolerance of the flow [1e-8]");
   add_number(app, "--atol", a.absolute_tolerance, Sign::positive, "Absolute tolerance of the flow [1e-10]");
   add_texts(app, "--average", a.averages, "STATE|NAME=EXPR",
@@ -168,6 +174,37 @@ void add_weak_options(CLI::App& app, WeakArguments& a) {
   add_assignments(app, a.parameters);
 }
 
+namespace {
+
+// Moves square-root processes by their exact transition. A price that is lognormal given these is integrated out:
+// payoffs become smooth functions of the variances and their integrals.
+void use_exact_transition(const WeakArguments& a, WeakProblem& problem) {
+  if (!a.square_roots.value_or(true)) return;
+  const bool other_way = a.formula || a.flow || a.relative_tolerance || a.absolute_tolerance ||
+                         a.degree.value_or(5) > 7 ||
+                         a.thin.value_or(ThinningMethod::recombination) != ThinningMethod::recombination;
+  const auto& structure = problem.source.square_roots();
+  if (other_way || !structure) return;
+  if (structure->price && a.horizons.size() > 1) return;  // it is integrated out at one time
+  if (!structure->price) {
+    SquareRootStructure own = *structure;
+    own.nonnegative_integrals = false;
+    problem.transition = std::make_shared<SquareRootTransition>(std::move(own));
+    return;
+  }
+  const ConditionalPrice price(*structure, problem.source.model().initial);
+  for (std::size_t i = 0; i < problem.kinked.size(); ++i) {
+    KinkedFunction smooth;
+    smooth.exact = price.average(problem.kinked[i].exact, problem.kinked[i].kinks, a.horizon());
+    problem.kinked[i] = std::move(smooth);
+  }
+  if (problem.discount_state) problem.discount_state = price.place(*problem.discount_state);
+  problem.source = problem.source.without_price();
+  problem.transition = std::make_shared<SquareRootTransition>(*problem.source.square_roots());
+}
+
+}  // namespace
+
 WeakProblem weak_problem(const WeakArguments& a) {
   return weak_problem(a, TextModel::load(model_file(a.model).string(), a.parameters));
 }
@@ -191,7 +228,7 @@ WeakProblem weak_problem(const WeakArguments& a, const TextModel& model) {
     model.compile(expression, "--average");  // for the place of a mistake in it
     integrals.push_back({name, fmt::format("({})/({:.17g})", expression, a.horizon()), "--average"});
   }
-  WeakProblem problem{model, {}, a.payoffs, {}, {}, {}, 0, {}};
+  WeakProblem problem{model, {}, a.payoffs, {}, {}, {}, 0, {}, {}};
   if (a.discount) {
     if (const auto constant = model.constant(*a.discount, "--discount")) {
       problem.discount_rate = *constant;
@@ -206,6 +243,7 @@ WeakProblem weak_problem(const WeakArguments& a, const TextModel& model) {
   for (const RunningIntegral& integral : integrals) problem.added.push_back(integral.name);
   for (const std::string& payoff : a.payoffs)
     problem.kinked.push_back(problem.source.compile_kinked(payoff, "--payoff"));
+  use_exact_transition(a, problem);
   choose_treatments(a, problem);
   return problem;
 }
@@ -257,8 +295,9 @@ std::vector<CubatureFormula> weak_formulas(const WeakArguments& a, const WeakPro
                      *a.formula);
   if (a.degree || a.formula) return {choose_formula(a.degree, a.formula, p)};
   std::vector<CubatureFormula> formulas;
-  // The highest degree has none above it to be compared with.
-  const std::vector<int> degrees = formula_degrees(p);
+  // The highest degree has none above it to be compared with; the exact transition has no rule above degree 7.
+  std::vector<int> degrees = formula_degrees(p);
+  if (problem.transition) std::erase_if(degrees, [](int degree) { return degree > 7; });
   for (const int degree : degrees)
     if (degree > 3 && (degree < degrees.back() || degree == 5))
       formulas.push_back(choose_formula(static_cast<std::uint64_t>(degree), {}, p));
@@ -269,7 +308,8 @@ std::vector<CubatureFormula> weak_guards(const WeakProblem& problem) {
   const std::size_t p = problem.source.model().noise_dimension();
   std::vector<CubatureFormula> guards;
   for (const int degree : formula_degrees(p))
-    guards.push_back(choose_formula(static_cast<std::uint64_t>(degree), {}, p));
+    if (degree <= 7 || !problem.transition)
+      guards.push_back(choose_formula(static_cast<std::uint64_t>(degree), {}, p));
   return guards;
 }
 
@@ -314,6 +354,7 @@ WeakRun weak_run(const WeakArguments& a, const WeakProblem& problem, CubatureFor
   o.tolerance.absolute = a.absolute_tolerance.value_or(o.tolerance.absolute);
   o.seed = a.seed.value_or(1);
   o.discount_state = problem.discount_state;
+  o.transition = problem.transition;
   for (const KinkedFunction& payoff : problem.kinked)
     if (!payoff.kinks.empty() && !o.finest_along) o.finest_along = payoff.kinks.front();
   const bool many =

@@ -1,6 +1,7 @@
 #pragma once
 /// The options of `weak`, and the problem and the run they stand for.
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -35,6 +36,7 @@ struct WeakArguments {
   std::optional<SiteOrder> order;
   std::optional<FlowMethod> flow;
   std::optional<KinkTreatment> kinks;
+  std::optional<bool> square_roots;  ///< by their exact transition
   bool richardson = false;
 
   double horizon() const { return horizons.back(); }
@@ -44,14 +46,15 @@ void add_weak_options(CLI::App& app, WeakArguments& arguments);
 
 /// A model and what is to be averaged at its horizon.
 struct WeakProblem {
-  TextModel source;                            ///< the model with its added states
-  std::vector<std::string> added;              ///< names of these
-  std::vector<std::string> payoffs;            ///< as given
-  std::vector<KinkedFunction> kinked;          ///< one a payoff
-  std::vector<KinkTreatment> treatment;        ///< one a payoff; sharp where there are no kinks
-  std::vector<std::vector<KinkScale>> scales;  ///< of the kinks of payoffs that a kernel smooths
-  double discount_rate = 0;                    ///< where it is constant
-  std::optional<std::size_t> discount_state;   ///< where it is not
+  TextModel source;                                  ///< the model with its added states
+  std::vector<std::string> added;                    ///< names of these
+  std::vector<std::string> payoffs;                  ///< as given
+  std::vector<KinkedFunction> kinked;                ///< one a payoff
+  std::vector<KinkTreatment> treatment;              ///< one a payoff; sharp where there are no kinks
+  std::vector<std::vector<KinkScale>> scales;        ///< of the kinks of payoffs that a kernel smooths
+  double discount_rate = 0;                          ///< where it is constant
+  std::optional<std::size_t> discount_state;         ///< where it is not
+  std::shared_ptr<const TransitionRule> transition;  ///< null: the paths of a formula
 };
 
 /// @throws InputError naming the option, with the column in an expression

@@ -52,6 +52,10 @@ Json report_of(const WeakArguments& a, const WeakProblem& problem, const WeakRun
   if (a.discount) options["discount"] = *a.discount;
   if (a.tolerance) options["tolerance"] = *a.tolerance;
   note_kinks(a, problem, options);
+  if (problem.transition) {
+    for (const char* followed : {"formula", "flow", "rtol", "atol"}) options.erase(followed);
+    options["square-roots"] = "auto";
+  }
   report["options"] = std::move(options);
   return report;
 }

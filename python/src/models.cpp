@@ -48,7 +48,8 @@ py::dict analysis_of(const PyModel& self) {
                   "sensor"_a = a.sensor, "sensor_derivative"_a = a.sensor_derivative,
                   "log_likelihood"_a = a.log_likelihood, "affine_fields"_a = a.affine_fields,
                   "has_exact_flow"_a = a.has_exact_flow, "exact_filter"_a = a.exact_filter_name,
-                  "exact_filter_reason"_a = a.exact_filter_reason);
+                  "exact_filter_reason"_a = a.exact_filter_reason, "square_roots"_a = a.square_roots,
+                  "square_roots_reason"_a = a.square_roots_reason);
 }
 
 std::string shown(const PyModel& self) {

@@ -189,6 +189,7 @@ def weak(
     integral: Optional[Union[str, Sequence[str]]] = None,
     kinks: Optional[Literal["auto", "last-step", "kernel", "sharp"]] = None,
     kink_width: Optional[float] = None,
+    square_roots: Optional[Literal["auto", "off"]] = None,
     discount: Optional[str] = None,
     tolerance: Optional[float] = None,
     richardson: Optional[bool] = None,

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <cstring>
 #include <filesystem>
@@ -11,6 +12,7 @@
 #include "wienertree/model/text/branches.hpp"
 #include "wienertree/model/text/exact_filter.hpp"
 #include "wienertree/model/text/smoothing.hpp"
+#include "wienertree/model/text/square_root_form.hpp"
 #include "wienertree/numeric/read_all.hpp"
 
 namespace wienertree {
@@ -20,6 +22,7 @@ struct TextModel::Contents {
   std::vector<double> parameters;
   Model model;
   std::string exact_filter_reason;
+  text::SquareRootAnswer square_roots;
 };
 
 namespace {
@@ -74,6 +77,7 @@ std::shared_ptr<TextModel::Contents> TextModel::build(Contents contents) {
   contents.model.exact_filter = exact.filter;
   contents.model.benes = exact.benes;
   contents.exact_filter_reason = exact.reason;
+  contents.square_roots = text::square_root_structure(bound, contents.model);
   check(contents.model);
   return std::make_shared<Contents>(std::move(contents));
 }
@@ -87,6 +91,34 @@ TextModel TextModel::with_integrals(const std::vector<RunningIntegral>& integral
   for (const RunningIntegral& integral : integrals)
     text::add_integral(extended.source, integral.name, integral.integrand, integral.where);
   return TextModel(build(std::move(extended)));
+}
+
+const std::optional<SquareRootStructure>& TextModel::square_roots() const {
+  return contents_->square_roots.structure;
+}
+
+TextModel TextModel::without_price() const {
+  const SquareRootStructure& structure = *contents_->square_roots.structure;
+  const auto price = static_cast<std::ptrdiff_t>(structure.price->state);
+  Contents reduced;
+  reduced.source = contents_->source;
+  reduced.parameters = contents_->parameters;
+  reduced.source.observation = {};
+  reduced.source.exact.reset();
+  for (const SquareRootStructure::Component& component : structure.components) {
+    const std::string& name = reduced.source.states[component.state].name;
+    std::string integral = "integral_" + name;
+    const auto is_taken = [&](const auto& named) { return named.name == integral; };
+    while (std::any_of(reduced.source.states.begin(), reduced.source.states.end(), is_taken) ||
+           std::any_of(reduced.source.parameters.begin(), reduced.source.parameters.end(), is_taken))
+      integral += "_";
+    text::add_integral(reduced.source, integral, fmt::format("{} + ({:.17g})", name, component.shift),
+                       "the integral of a variance");
+  }
+  reduced.source.states.erase(reduced.source.states.begin() + price);
+  reduced.source.drift.erase(reduced.source.drift.begin() + price);
+  reduced.source.diffusion.erase(reduced.source.diffusion.begin() + price);
+  return TextModel(build(std::move(reduced)));
 }
 
 Model TextModel::with_brackets(const std::vector<std::pair<std::size_t, std::size_t>>& brackets) const {
@@ -128,6 +160,9 @@ ModelAnalysis TextModel::analysis() const {
   result.exact_filter = model.exact_filter;
   result.exact_filter_name = text::name(model.exact_filter);
   result.exact_filter_reason = contents_->exact_filter_reason;
+  if (contents_->square_roots.structure)
+    result.square_roots = text::described(*contents_->square_roots.structure, model);
+  result.square_roots_reason = contents_->square_roots.reason;
   return result;
 }
 

@@ -14,6 +14,7 @@
 
 #include "wienertree/model/batch_function.hpp"
 #include "wienertree/model/model.hpp"
+#include "wienertree/model/square_root.hpp"
 
 namespace wienertree {
 
@@ -49,6 +50,10 @@ struct ModelAnalysis {
   ExactFilter exact_filter = ExactFilter::none;
   std::string exact_filter_name;    ///< "benes", "kalman-bucy", "kalman", "none"
   std::string exact_filter_reason;  ///< why it applies, or why none does
+  /// What is known of the transition: one line for each square-root process, and for a price that is lognormal
+  /// given these; empty where there is none, or other states stand in the way.
+  std::vector<std::string> square_roots;
+  std::string square_roots_reason;  ///< why there is none
 };
 
 /// int_0^t of an expression of states, parameters and time along the path, under a name of its own.
@@ -84,6 +89,11 @@ class TextModel {
   /// starting from 0. An integrand may use the integrals before it. What is observed is left out.
   /// @throws InputError if a name is no identifier or taken, or an integrand is not an expression
   TextModel with_integrals(const std::vector<RunningIntegral>& integrals) const;
+  /// The square-root processes that the signal is made of, if it is made of nothing else.
+  const std::optional<SquareRootStructure>& square_roots() const;
+  /// The signal without its price (`square_roots()->price`), and with int_0^t w_k dt of every square-root
+  /// process as further states, in order.   @pre there is a price
+  TextModel without_price() const;
   /// The signal with Lie brackets as further driving fields V_{p+1}, V_{p+2}, ..: bracket (i, j) is
   /// [V_i, V_j] = (DV_j) V_i - (DV_i) V_j, of V_0 .. V_p or of brackets before it. Only its flows mean
   /// anything (`direct`, `jacobian`, `exact_flow`): a bracket drives no Brownian motion.

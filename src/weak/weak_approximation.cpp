@@ -87,7 +87,7 @@ class WeakTree {
   }
 
  private:
-  std::uint64_t solves() const { return solves_before_ + grower_.statistics().node_segments; }
+  std::uint64_t solves() const { return solves_before_ + grower_.statistics().node_segments + moved_; }
   double length(std::size_t j) const { return options_.grid[j] - options_.grid[j - 1]; }
 
   std::size_t expected_values() const {
@@ -150,14 +150,22 @@ class WeakTree {
       throw_node_failure(failures_, model_, fmt::format("step {}, t = {:g}", j, options_.grid[j]));
   }
 
+  // All children of all nodes.
+  void move(const Generation& parents, double s, Generation& children, std::vector<NodeFailure>& failures) {
+    if (!options_.transition) return grower_.grow(parents, s, children, failures);
+    failures.clear();
+    options_.transition->grow(parents, options_.formula.degree, s, &grower_.threads(), children);
+    moved_ += children.size();
+  }
+
   void step(std::size_t j, const RandomStream& random, bool keep_all) {
-    grower_.grow(nodes_, length(j), children_, failures_);
+    move(nodes_, length(j), children_, failures_);
     require_success(j);
     settle(children_, j);
     const std::size_t parents = nodes_.size();
     if (reports(j) && !(two_steps_ && j > 1)) report(j, children_, parents);
     if (two_steps_ && j + 1 < options_.grid.size() && reports(j + 1)) {
-      grower_.grow(children_, length(j + 1), grandchildren_, failures_);
+      move(children_, length(j + 1), grandchildren_, failures_);
       require_success(j + 1);
       settle(grandchildren_, j + 1);
       report(j + 1, grandchildren_, parents);
@@ -237,6 +245,7 @@ class WeakTree {
   std::vector<NodeFailure> failures_;
   double discarded_ = 0;
   std::size_t steps_done_ = 0;
+  std::uint64_t moved_ = 0;          ///< children by a transition
   std::uint64_t solves_before_ = 0;  ///< of the run whose state was read
 };
 
@@ -252,6 +261,8 @@ WeakEstimate weak_approximation(const Model& model, const Generation& start,
     throw InputError(fmt::format("is not one of {} states", model.state_dimension()), "discount_state",
                      std::to_string(*options.discount_state));
   if (options.nodes == 0) throw InputError("must be at least 1", "nodes", "0");
+  if (options.transition && options.thinning.order == SiteOrder::tree && !recombines(options.thinning.method))
+    throw InputError("needs a thinning that looks at states", "transition");
   if (options.thinning.method == ThinningMethod::none)
     refuse_oversized_tree(options.formula, model, options.grid.size() - 1, options.memory_limit,
                           start.size());

@@ -6,6 +6,7 @@
 #include <concepts>
 #include <cstdint>
 #include <functional>
+#include <memory>
 #include <optional>
 #include <vector>
 
@@ -17,6 +18,7 @@
 #include "wienertree/thinning/thinning.hpp"
 #include "wienertree/tree/generation.hpp"
 #include "wienertree/tree/time_grid.hpp"
+#include "wienertree/tree/transition.hpp"
 
 namespace wienertree {
 
@@ -46,6 +48,9 @@ struct WeakOptions {
   /// What the payoffs bend along, the argument of a kink, say; may be empty. In two dimensions and more
   /// recombination is then finest along its value at T on the path without noise (slabs.hpp).
   BatchFunction finest_along = {};
+  /// Moves nodes instead of the formula's paths, as well as its degree asks for; may be null. Not with a random
+  /// thinning in tree order.
+  std::shared_ptr<const TransitionRule> transition = {};
   FlowMethod flow = FlowMethod::automatic;
   FlowTolerance tolerance;
   std::uint64_t seed = 1;

@@ -182,19 +182,4 @@ bool is_piecewise(Expression e) {
       e, [](Expression part) { return part->kind == Node::Kind::function && is_piecewise(part->op); });
 }
 
-std::vector<Expression> kink_arguments(Expression e, Arena& arena) {
-  std::vector<Expression> result;
-  any_part(e, [&](Expression part) {
-    if (part->kind != Node::Kind::function || !is_piecewise(part->op)) return false;
-    Expression u = part->operands[0];
-    if (part->op == Op::minimum || part->op == Op::maximum)
-      u = arena.sum({u, arena.product({arena.number(-1), part->operands[1]})});
-    // The jumps of a condition made of comparisons are those of its comparisons.
-    if ((part->op == Op::where || part->op == Op::unless) && is_piecewise(u)) return false;
-    if (std::find(result.begin(), result.end(), u) == result.end()) result.push_back(u);
-    return false;
-  });
-  return result;
-}
-
 }  // namespace wienertree::text

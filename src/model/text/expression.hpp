@@ -93,10 +93,6 @@ bool contains(Expression e, Role role);
 bool contains(Expression e, Role role, std::size_t index);
 /// Whether min, max, abs, sign, a comparison or `if` occur, so that the expression is not analytic.
 bool is_piecewise(Expression e);
-/// The functions u of the states at whose zeros the expression has kinks or jumps: a - b of min(a, b) and
-/// max(a, b), the arguments of abs, sign and step (a comparison a > b is step(a - b)), the condition of an
-/// `if` where it is not made of comparisons. Each once, in the order of the expression.
-std::vector<Expression> kink_arguments(Expression e, Arena& arena);
 
 /// What the symbols of a bound expression are on a tape.
 struct TapeSymbols {
