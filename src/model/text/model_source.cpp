@@ -1,5 +1,7 @@
 #include "wienertree/model/text/model_source.hpp"
 
+#include "wienertree/model/text/printable.hpp"
+
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -176,7 +178,9 @@ ModelSource read(const toml::table& table, const TomlFile& file) {
   root.only(model_keys);
   ModelSource model;
   model.file = file.name;
-  model.name = root.has("name") ? root.string("name") : stem(file.name);
+  model.name = root.has("name") ? root.string("name") : printable(stem(file.name));
+  if (model.name != printable(model.name))
+    throw InputError("must be one line of printable characters", root.location("name").text(), model.name);
   model.convention =
       root.choice("convention", {"ito", "stratonovich"}) == 0 ? Convention::ito : Convention::stratonovich;
   if (root.has("parameters")) model.parameters = read_parameters(root.section("parameters"));

@@ -1,5 +1,7 @@
 #include "wienertree/model/text/toml_section.hpp"
 
+#include "wienertree/model/text/printable.hpp"
+
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -39,6 +41,23 @@ std::size_t byte_offset(std::string_view line, std::size_t column) {
   return i;
 }
 
+// Names and labels go to terminals, pictures and pages. Line ends and tabs may stand in an expression.
+void refuse_control_characters(const toml::node& node, const std::string& file) {
+  const auto check = [&file](const std::string& text, const toml::source_region& place) {
+    if (const std::string found = unprintable_character(text); !found.empty())
+      throw InputError("a text must not hold the character " + found,
+                       Location{file, place.begin.line, place.begin.column, ""}.text(), text.substr(0, 80));
+  };
+  if (const toml::array* array = node.as_array())
+    for (const toml::node& element : *array) refuse_control_characters(element, file);
+  if (const toml::table* table = node.as_table())
+    for (const auto& [key, value] : *table) {
+      check(std::string(key.str()), key.source());
+      refuse_control_characters(value, file);
+    }
+  if (const auto* text = node.as_string()) check(text->get(), node.source());
+}
+
 }  // namespace
 
 std::vector<std::string_view> split_lines(std::string_view text) {
@@ -54,7 +73,9 @@ std::vector<std::string_view> split_lines(std::string_view text) {
 toml::table parse_toml(std::string_view text, const std::string& file) {
   limit_toml_depth(text, file);
   try {
-    return toml::parse(text, file);
+    toml::table table = toml::parse(text, file);
+    refuse_control_characters(table, file);
+    return table;
   } catch (const toml::parse_error& error) {
     const Location place{file, error.source().begin.line, error.source().begin.column, ""};
     throw InputError("TOML syntax: " + std::string(error.description()), place.text());
