@@ -11,10 +11,15 @@ namespace {
 
 constexpr int width = 940, title_height = 44, panel_height = 260, axis_height = 52, left = 78, right = 250;
 constexpr std::size_t most_points = 1500;  // more than a screen has
-constexpr std::array colours = {colour::black,  colour::blue, colour::vermillion, colour::green,
-                                colour::orange, colour::sky,  colour::grey};
+constexpr std::array<Literal, 7> colours = {colour::black,  colour::blue, colour::vermillion, colour::green,
+                                            colour::orange, colour::sky,  colour::grey};
+constexpr std::array<Literal, 7> band_colours = {"#C8000000", "#C80072B2", "#C8D55E00", "#C8009E73",
+                                                 "#C8E69F00", "#C856B4E9", "#C8777777"};
 
-const char* colour_of(std::size_t model) { return colours[model % colours.size()]; }
+Literal colour_of(std::size_t model) { return colours[model % colours.size()]; }
+
+// The same, nearly transparent.
+Literal band_of(std::size_t model) { return band_colours[model % band_colours.size()]; }
 
 std::vector<std::size_t> drawn_rows(std::size_t rows) {
   const std::size_t stride = 1 + rows / most_points;
@@ -34,7 +39,7 @@ std::string short_label(const std::string& label) {
 }
 
 struct Panel {
-  std::string id, title;
+  Literal id, title;
   std::vector<std::vector<double>> value, low, high;  ///< a curve a model, empty where none is drawn
   double bottom = INFINITY, top = -INFINITY;
 
@@ -47,7 +52,7 @@ struct Panel {
   }
 };
 
-Panel empty_panel(const std::string& id, const std::string& title, std::size_t models) {
+Panel empty_panel(Literal id, Literal title, std::size_t models) {
   Panel panel{id, title, {}, {}, {}};
   panel.value.resize(models);
   panel.low.resize(models);
@@ -61,23 +66,22 @@ void draw_panel(Picture& picture, const std::vector<Contender>& contenders, cons
   panel.bottom -= margin;
   panel.top += margin;
   std::vector<SideLabel> labels;
-  std::string plot;
-  const auto join = [&] { return plot.empty() ? "plot " : ", "; };
+  std::vector<Script> plots;
   for (std::size_t m = 0; m < contenders.size(); ++m) {
     if (panel.value[m].empty()) continue;
-    const std::string id = fmt::format("{}{}", panel.id, m);
+    const Script id = command("{}{}", panel.id, m);
     picture.add_data(id, std::array{time, panel.value[m], panel.low[m], panel.high[m]});
     if (bands)
-      plot += fmt::format("{}${} using 1:3:4 with filledcurves fillcolor rgb \"#C8{}\" notitle", join(), id,
-                          std::string(colour_of(m)).substr(1));
-    plot += fmt::format("{}${} using 1:2 with lines lw 1.8 lc rgb \"{}\"", join(), id, colour_of(m));
+      plots.push_back(
+          command("${} using 1:3:4 with filledcurves fillcolor rgb \"{}\" notitle", id, band_of(m)));
+    plots.push_back(command("${} using 1:2 with lines lw 1.8 lc rgb \"{}\"", id, colour_of(m)));
     labels.push_back({short_label(contenders[m].label), colour_of(m),
                       (panel.value[m].back() - panel.bottom) / (panel.top - panel.bottom)});
   }
-  picture.add(fmt::format("set yrange [{:.9g}:{:.9g}]", panel.bottom, panel.top));
-  picture.add(name_of_height(panel.title, 16.0 / width));
+  picture.add("set yrange [{:.9g}:{:.9g}]", panel.bottom, panel.top);
+  picture.add(name_of_height(panel.title.text, 16.0 / width));
   picture.add(labels_at_right(std::move(labels), 18.0 / panel_height));
-  picture.add(plot);
+  picture.add("plot {}", joined(plots));
 }
 
 }  // namespace
@@ -100,20 +104,20 @@ std::string draw_comparison(Picture picture, const std::vector<Contender>& conte
   }
   const int height = title_height + 2 * panel_height + axis_height;
   picture.begin(width, height);
-  picture.add(fmt::format("set multiplot\nset label 1 {} at screen 0.5,{:.4f} center noenhanced",
-                          app::in_quotes("Bayes factors against " + contenders.front().label + ", " +
-                                         describe(contenders.front().setup)),
-                          1 - 0.55 * title_height / height));
-  picture.add(fmt::format("set lmargin at screen {:.4f}\nset rmargin at screen {:.4f}",
-                          static_cast<double>(left) / width, 1 - static_cast<double>(right) / width));
-  picture.add(fmt::format("set xrange [{:.9g}:{:.9g}]\nset xzeroaxis lc rgb \"{}\" lw 0.6", time.front(),
-                          std::max(time.back(), time.front() + 1e-9), colour::grey));
+  picture.add("set multiplot\nset label 1 {} at screen 0.5,{:.4f} center noenhanced",
+              gnuplot_string("Bayes factors against " + contenders.front().label + ", " +
+                             describe(contenders.front().setup)),
+              1 - 0.55 * title_height / height);
+  picture.add("set lmargin at screen {:.4f}\nset rmargin at screen {:.4f}", static_cast<double>(left) / width,
+              1 - static_cast<double>(right) / width);
+  picture.add("set xrange [{:.9g}:{:.9g}]\nset xzeroaxis lc rgb \"{}\" lw 0.6", time.front(),
+              std::max(time.back(), time.front() + 1e-9), colour::grey);
   for (const int i : {0, 1}) {
     const double top = 1 - static_cast<double>(title_height + i * panel_height) / height;
     const double bottom = top - static_cast<double>(panel_height - 12) / height;
-    picture.add(fmt::format("set tmargin at screen {:.4f}\nset bmargin at screen {:.4f}", top, bottom));
-    picture.add(i == 1 ? "set format x \"%g\"\nunset label\n" + name_of_width("t", 14.0 / height)
-                       : "set format x \"\"");
+    picture.add("set tmargin at screen {:.4f}\nset bmargin at screen {:.4f}", top, bottom);
+    picture.add(i == 1 ? command("set format x \"%g\"\nunset label\n{}", name_of_width("t", 14.0 / height))
+                       : command("set format x \"\""));
     draw_panel(picture, contenders, time, i == 0 ? factors : chances,
                i == 0 && contenders.front().setup.launches > 1);
   }

@@ -26,16 +26,16 @@ Curve outline(const Histogram& h) {
 
 struct Piece {
   Curve curve;
-  std::string style;  ///< gnuplot's
+  Script style;
 };
 
 std::vector<Piece> pieces_of(const DensityPanel& panel) {
-  const auto line = [](const char* style, const char* colour) {
-    return fmt::format("with lines {} lc rgb \"{}\"", style, colour);
+  const auto line = [](Literal style, Literal colour) {
+    return command("with lines {} lc rgb \"{}\"", style, colour);
   };
   std::vector<Piece> pieces = {
       {outline(panel.nodes),
-       fmt::format("with filledcurves y=0 fillcolor rgb \"{}\" fs solid 0.6 noborder", colour::sky)}};
+       command("with filledcurves y=0 fillcolor rgb \"{}\" fs solid 0.6 noborder", colour::sky)}};
   if (panel.prior) pieces.push_back({*panel.prior, line("lw 1.6 dashtype (8,5)", colour::grey)});
   if (panel.prior_nodes) pieces.push_back({outline(*panel.prior_nodes), line("lw 1.3", colour::grey)});
   if (panel.exact) pieces.push_back({*panel.exact, line("lw 2.2", colour::black)});
@@ -43,9 +43,9 @@ std::vector<Piece> pieces_of(const DensityPanel& panel) {
 }
 
 // What is drawn, in its colour, from the top down: beside the panel, or in its corner where there is no room.
-std::string labels_of(const DensityPanel& panel, bool inside) {
+Script labels_of(const DensityPanel& panel, bool inside) {
   std::vector<SideLabel> labels;
-  const auto add = [&](bool drawn, const char* text, const char* colour) {
+  const auto add = [&](bool drawn, const char* text, Literal colour) {
     if (drawn) labels.push_back({text, colour, 1.0});
   };
   add(true, panel.rug.empty() ? "filter" : "nodes, weighted", colour::blue);
@@ -54,18 +54,18 @@ std::string labels_of(const DensityPanel& panel, bool inside) {
   add(panel.prior_nodes.has_value(), "prior", colour::grey);
   add(panel.signal.has_value(), "true signal", colour::vermillion);
   if (!inside) return labels_at_right(std::move(labels), 20.0 / panel_height);
-  std::string commands;
+  Script commands;
   for (std::size_t i = 0; i < labels.size(); ++i)
     commands +=
-        fmt::format("set label {} at graph 0.99,{:.3f} right textcolor rgb \"{}\" noenhanced font \",11\"\n",
-                    in_quotes(labels[i].text), 0.97 - 0.055 * static_cast<double>(i), labels[i].colour);
+        command("set label {} at graph 0.99,{:.3f} right textcolor rgb \"{}\" noenhanced font \",11\"\n",
+                gnuplot_string(labels[i].text), 0.97 - 0.055 * static_cast<double>(i), labels[i].colour);
   return commands;
 }
 
 // A vertical line from the axis.
-std::string upright(const std::string& data, double height, double line_width, const char* colour) {
-  return fmt::format(", ${} using 1:(0):(0):({:.9g}) with vectors nohead lw {} lc rgb \"{}\"", data, height,
-                     line_width, colour);
+Script upright(const Script& data, double height, double line_width, Literal colour) {
+  return command(", ${} using 1:(0):(0):({:.9g}) with vectors nohead lw {} lc rgb \"{}\"", data, height,
+                 line_width, colour);
 }
 
 struct Extent {
@@ -96,25 +96,25 @@ void draw_panel(Picture& picture, const DensityPanel& panel, const Extent& exten
   double top = 0;
   for (const Piece& piece : pieces)
     top = std::max(top, *std::max_element(piece.curve.y.begin(), piece.curve.y.end()));
-  picture.add(
-      fmt::format("set xrange [{:.9g}:{:.9g}]\nset yrange [0:{:.9g}]", extent.low, extent.high, 1.12 * top));
+  picture.add("set xrange [{:.9g}:{:.9g}]\nset yrange [0:{:.9g}]", extent.low, extent.high, 1.12 * top);
   picture.add(labels_of(panel, narrow));
   if (!panel.title.empty())
-    picture.add(fmt::format("set label {} at graph 0.015,0.95 left noenhanced{}", in_quotes(panel.title),
-                            narrow ? " font \",11\"" : ""));
-  std::string plot = "plot ";
+    picture.add("set label {} at graph 0.015,0.95 left noenhanced{}", gnuplot_string(panel.title),
+                narrow ? Literal(" font \",11\"") : Literal(""));
+  std::vector<Script> plots;
   for (std::size_t k = 0; k < pieces.size(); ++k) {
-    const std::string name = fmt::format("panel{}piece{}", number, k);
+    const Script name = command("panel{}piece{}", number, k);
     picture.add_data(name, std::array{pieces[k].curve.x, pieces[k].curve.y});
-    plot += fmt::format("{}${} using 1:2 {}", k > 0 ? ", " : "", name, pieces[k].style);
+    plots.push_back(command("${} using 1:2 {}", name, pieces[k].style));
   }
+  Script plot = command("plot {}", joined(plots));
   if (!panel.rug.empty()) {
-    const std::string name = fmt::format("panel{}rug", number);
+    const Script name = command("panel{}rug", number);
     picture.add_data(name, std::array{panel.rug});
     plot += upright(name, 0.035 * top, 0.7, colour::blue);
   }
   if (panel.signal) {
-    const std::string name = fmt::format("panel{}signal", number);
+    const Script name = command("panel{}signal", number);
     picture.add_data(name, std::array{std::vector{*panel.signal}});
     plot += upright(name, 1.12 * top, 1.6, colour::vermillion);
   }
@@ -132,15 +132,15 @@ std::string draw_density(Picture picture, const std::string& title, const std::v
   const int count = static_cast<int>(panels.size()), height = title_height + count * panel_height;
   const bool narrow = width < 640;
   picture.begin(width, height);
-  picture.add(fmt::format("set label 1 {} at screen 0.5,{:.4f} center noenhanced font \",{}\"\nset multiplot",
-                          in_quotes(title), 1 - 0.55 * title_height / height, narrow ? 11 : 14));
-  picture.add(fmt::format("set lmargin at screen {:.4f}\nset rmargin at screen {:.4f}",
-                          (narrow ? 60.0 : 86.0) / width, 1 - (narrow ? 14.0 : 150.0) / width));
+  picture.add("set label 1 {} at screen 0.5,{:.4f} center noenhanced font \",{}\"\nset multiplot",
+              gnuplot_string(title), 1 - 0.55 * title_height / height, narrow ? 11 : 14);
+  picture.add("set lmargin at screen {:.4f}\nset rmargin at screen {:.4f}", (narrow ? 60.0 : 86.0) / width,
+              1 - (narrow ? 14.0 : 150.0) / width);
   if (narrow) picture.add("set tics font \",11\"");
   for (int i = 0; i < count; ++i) {
     const double top = 1 - static_cast<double>(title_height + i * panel_height) / height;
     const double bottom = top - static_cast<double>(panel_height - 60) / height;
-    picture.add(fmt::format("set tmargin at screen {:.4f}\nset bmargin at screen {:.4f}", top, bottom));
+    picture.add("set tmargin at screen {:.4f}\nset bmargin at screen {:.4f}", top, bottom);
     if (i > 0) picture.add("unset label");
     const DensityPanel& panel = panels[static_cast<std::size_t>(i)];
     picture.add(name_of_height("density", (narrow ? 9.0 : 16.0) / width));

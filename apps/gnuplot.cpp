@@ -14,9 +14,8 @@
 #include <cstdlib>
 #include <system_error>
 
+#include "wienertree/model/text/printable.hpp"
 #include "wienertree/numeric/error.hpp"
-
-extern char** environ;
 
 namespace wienertree::app {
 namespace {
@@ -66,6 +65,16 @@ class MemoryFile {
   int file_;
 };
 
+// What gnuplot needs of the environment to start and to find fonts. Nothing else reaches it, so that no GNUTERM,
+// GNUPLOT_LIB, GNUPLOT_FONTPATH, GDFONTPATH or locale changes a picture.
+std::vector<std::string> environment_of_child() {
+  std::vector<std::string> kept;
+  for (const char* name : {"PATH", "HOME", "TMPDIR", "XDG_CACHE_HOME", "LD_LIBRARY_PATH", "FONTCONFIG_FILE",
+                           "FONTCONFIG_PATH", "FONTCONFIG_SYSROOT"})
+    if (const char* value = std::getenv(name)) kept.push_back(fmt::format("{}={}", name, value));
+  return kept;
+}
+
 std::string first_line_of(const std::string& text) {
   std::string line;
   std::size_t begin = 0;
@@ -94,19 +103,18 @@ Picture::Picture(const std::string& file) : file_(file) {
 
 void Picture::begin(int width, int height) {
   if (vector_graphics_)
-    add(fmt::format(
-        "set terminal svg size {},{} font \"Helvetica,14\" enhanced background rgb \"white\" linewidth 1",
-        width, height));
+    add("set terminal svg size {},{} font \"Helvetica,14\" enhanced background rgb \"white\" linewidth 1",
+        width, height);
   else
-    add(fmt::format("set terminal pngcairo size {},{} font \"Sans,12\" fontscale 1.9 enhanced linewidth 2",
-                    2 * width, 2 * height));
+    add("set terminal pngcairo size {},{} font \"Sans,12\" fontscale 1.9 enhanced linewidth 2", 2 * width,
+        2 * height);
   add("set encoding utf8\nset minussign\nset border 3 lw 0.8 lc rgb \"#444444\"\nset tics nomirror out scale "
       "0.6\nunset "
       "key");
 }
 
-void Picture::add_data(const std::string& name, std::span<const std::vector<double>> columns) {
-  script_ += fmt::format("${} << END_OF_DATA\n", name);
+void Picture::add_data(const Script& name, std::span<const std::vector<double>> columns) {
+  script_ += fmt::format("${} << END_OF_DATA\n", name.text());
   const std::size_t rows = columns.empty() ? 0 : columns.front().size();
   for (std::size_t r = 0; r < rows; ++r) {
     for (const std::vector<double>& column : columns)
@@ -127,8 +135,13 @@ std::string Picture::draw() const {
   // -d: the user's own start-up file does not change the picture.
   std::array<std::string, 2> words = {program_, "-d"};
   std::array<char*, 3> arguments = {words[0].data(), words[1].data(), nullptr};
+  std::vector<std::string> kept = environment_of_child();
+  std::vector<char*> environment;
+  for (std::string& setting : kept) environment.push_back(setting.data());
+  environment.push_back(nullptr);
   pid_t child = 0;
-  const int error = ::posix_spawn(&child, program_.c_str(), &files, nullptr, arguments.data(), environ);
+  const int error =
+      ::posix_spawn(&child, program_.c_str(), &files, nullptr, arguments.data(), environment.data());
   ::posix_spawn_file_actions_destroy(&files);
   if (error != 0)
     throw RunError("gnuplot cannot be run: " + std::generic_category().message(error), "plot", file_);
@@ -140,25 +153,35 @@ std::string Picture::draw() const {
   return bytes;
 }
 
-std::string in_quotes(const std::string& text) {
+Script gnuplot_string(std::string_view text) {
+  // Not a digit: gnuplot would count it to an octal code before it.
+  const auto stands_for_itself = [](unsigned char c) {
+    return c == ' ' || c >= 0x80 || (c >= 'A' && c <= 'Z') || (c >= 'a' && c <= 'z');
+  };
   std::string out = "\"";
-  for (const char c : text) {
-    if (c == '"' || c == '\\') out += '\\';
-    out += c == '\n' ? ' ' : c;
-  }
-  return out + '"';
+  for (const char c : text::printable(text))
+    out += stands_for_itself(static_cast<unsigned char>(c))
+               ? std::string(1, c)
+               : fmt::format("\\{:03o}", static_cast<unsigned>(static_cast<unsigned char>(c)));
+  return Script(out + '"');
 }
 
-std::string name_of_height(const std::string& text, double x) {
-  return fmt::format("set label {} at screen {:.4f}, graph 0.5 center rotate by 90 noenhanced",
-                     in_quotes(text), x);
+Script joined(const std::vector<Script>& pieces) {
+  Script all;
+  for (const Script& piece : pieces) all += all.empty() ? piece : command(", {}", piece);
+  return all;
 }
 
-std::string name_of_width(const std::string& text, double y) {
-  return fmt::format("set label {} at graph 0.5, screen {:.4f} center noenhanced", in_quotes(text), y);
+Script name_of_height(const std::string& text, double x) {
+  return command("set label {} at screen {:.4f}, graph 0.5 center rotate by 90 noenhanced",
+                 gnuplot_string(text), x);
 }
 
-std::string labels_at_right(std::vector<SideLabel> labels, double spacing) {
+Script name_of_width(const std::string& text, double y) {
+  return command("set label {} at graph 0.5, screen {:.4f} center noenhanced", gnuplot_string(text), y);
+}
+
+Script labels_at_right(std::vector<SideLabel> labels, double spacing) {
   std::stable_sort(labels.begin(), labels.end(), [](const auto& a, const auto& b) { return a.y > b.y; });
   double ceiling = 1;
   for (SideLabel& label : labels) {
@@ -170,10 +193,10 @@ std::string labels_at_right(std::vector<SideLabel> labels, double spacing) {
     label->y = std::max(label->y, floor);
     floor = label->y + spacing;
   }
-  std::string commands;
+  Script commands;
   for (const SideLabel& label : labels)
-    commands += fmt::format("set label {} at graph 1.012,{:.4f} left textcolor rgb \"{}\" noenhanced\n",
-                            in_quotes(label.text), label.y, label.colour);
+    commands += command("set label {} at graph 1.012,{:.4f} left textcolor rgb \"{}\" noenhanced\n",
+                        gnuplot_string(label.text), label.y, label.colour);
   return commands;
 }
 

@@ -38,7 +38,7 @@ std::vector<double> every_kth(const std::vector<double>& values) {
   return kept;
 }
 
-void add_curves(Picture& picture, const std::string& name,
+void add_curves(Picture& picture, const Script& name,
                 std::initializer_list<const std::vector<double>*> columns) {
   std::vector<std::vector<double>> kept;
   for (const std::vector<double>* column : columns) kept.push_back(every_kth(*column));
@@ -69,7 +69,7 @@ Curve within(const Curve& curve, double start, double end) {
   return kept;
 }
 
-std::string labels_of(const PosteriorPanel& panel, const Range& range, double spacing) {
+Script labels_of(const PosteriorPanel& panel, const Range& range, double spacing) {
   std::vector<SideLabel> labels = {{"95 %", colour::blue, range.part(panel.filter.high.back())},
                                    {"posterior mean", colour::blue, range.part(panel.filter.mean.back())},
                                    {"5 %", colour::blue, range.part(panel.filter.low.back())}};
@@ -81,23 +81,23 @@ std::string labels_of(const PosteriorPanel& panel, const Range& range, double sp
 
 void draw_panel(Picture& picture, const PosteriorPanel& panel, std::size_t number, int panel_height) {
   const Range range = range_of(panel);
-  picture.add(fmt::format("set yrange [{:.9g}:{:.9g}]", range.low, range.high));
+  picture.add("set yrange [{:.9g}:{:.9g}]", range.low, range.high);
   picture.add(name_of_height(panel.state, 22.0 / width));
   picture.add(labels_of(panel, range, 18.0 / panel_height));
-  const std::string id = fmt::format("panel{}", number);
+  const Script id = command("panel{}", number);
   add_curves(picture, id, {&panel.filter.time, &panel.filter.low, &panel.filter.high, &panel.filter.mean});
-  std::string plot = fmt::format("plot ${0} using 1:2:3 with filledcurves fillcolor rgb \"#B056B4E9\"", id);
+  Script plot = command("plot ${0} using 1:2:3 with filledcurves fillcolor rgb \"#B056B4E9\"", id);
   if (panel.signal && !panel.signal->x.empty()) {
-    add_curves(picture, id + "signal", {&panel.signal->x, &panel.signal->y});
-    plot += fmt::format(", ${}signal using 1:2 with lines lw 1.0 lc rgb \"{}\"", id, colour::vermillion);
+    add_curves(picture, command("{}signal", id), {&panel.signal->x, &panel.signal->y});
+    plot += command(", ${}signal using 1:2 with lines lw 1.0 lc rgb \"{}\"", id, colour::vermillion);
   }
-  plot += fmt::format(", ${} using 1:4 with lines lw 2.2 lc rgb \"{}\"", id, colour::blue);
+  plot += command(", ${} using 1:4 with lines lw 2.2 lc rgb \"{}\"", id, colour::blue);
   if (panel.exact) {
-    add_curves(picture, id + "exact",
+    add_curves(picture, command("{}exact", id),
                {&panel.exact->time, &panel.exact->low, &panel.exact->high, &panel.exact->mean});
     for (const int column : {2, 3, 4})
-      plot += fmt::format(", ${}exact using 1:{} with lines lw {} dashtype (9,6) lc rgb \"{}\"", id, column,
-                          column == 4 ? 1.2 : 0.8, colour::black);
+      plot += command(", ${}exact using 1:{} with lines lw {} dashtype (9,6) lc rgb \"{}\"", id, column,
+                      column == 4 ? 1.2 : 0.8, colour::black);
   }
   picture.add(plot);
 }
@@ -115,20 +115,18 @@ std::string draw_posterior(Picture picture, const std::string& title,
   const int count = static_cast<int>(panels.size()), panel_height = count == 1 ? 320 : 250;
   const int height = title_height + count * panel_height + axis_height;
   picture.begin(width, height);
-  picture.add(fmt::format("set multiplot\nset label 1 {} at screen 0.5,{:.4f} center noenhanced",
-                          in_quotes(title), 1 - 0.55 * title_height / height));
-  picture.add(fmt::format("set lmargin at screen {:.4f}\nset rmargin at screen {:.4f}", 94.0 / width,
-                          1 - 136.0 / width));
+  picture.add("set multiplot\nset label 1 {} at screen 0.5,{:.4f} center noenhanced", gnuplot_string(title),
+              1 - 0.55 * title_height / height);
+  picture.add("set lmargin at screen {:.4f}\nset rmargin at screen {:.4f}", 94.0 / width, 1 - 136.0 / width);
   const std::vector<double>& time = panels.front().filter.time;
-  picture.add(
-      fmt::format("set xrange [{:.9g}:{:.9g}]", time.front(), std::max(time.back(), time.front() + 1e-9)));
+  picture.add("set xrange [{:.9g}:{:.9g}]", time.front(), std::max(time.back(), time.front() + 1e-9));
   for (int i = 0; i < count; ++i) {
     const double top = 1 - static_cast<double>(title_height + i * panel_height) / height;
     const double bottom = top - static_cast<double>(panel_height - 12) / height;
-    picture.add(fmt::format("set tmargin at screen {:.4f}\nset bmargin at screen {:.4f}", top, bottom));
+    picture.add("set tmargin at screen {:.4f}\nset bmargin at screen {:.4f}", top, bottom);
     if (i > 0) picture.add("unset label");
-    picture.add(i + 1 == count ? "set format x \"%g\"\n" + name_of_width("t", 14.0 / height)
-                               : "set format x \"\"");
+    picture.add(i + 1 == count ? command("set format x \"%g\"\n{}", name_of_width("t", 14.0 / height))
+                               : command("set format x \"\""));
     PosteriorPanel panel = panels[static_cast<std::size_t>(i)];
     if (panel.signal) panel.signal = within(*panel.signal, time.front(), time.back());
     draw_panel(picture, panel, static_cast<std::size_t>(i), panel_height);

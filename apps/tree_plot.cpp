@@ -83,17 +83,17 @@ void draw_panel(Picture& picture, const Genealogy& g, std::size_t component, boo
       high = std::max(high, nodes[1][i]);
     }
   const double margin = high > low ? 0.08 * (high - low) : std::max(1e-9, 0.1 * std::fabs(low));
-  picture.add(fmt::format("set yrange [{:.9g}:{:.9g}]", low - margin, high + margin));
+  picture.add("set yrange [{:.9g}:{:.9g}]", low - margin, high + margin);
   picture.add(name_of_height(g.state_names()[component], 22.0 / width));
-  const std::string id = fmt::format("state{}", component);
+  const Script id = command("state{}", component);
   picture.add_data(id, nodes);
-  picture.add_data(id + "edges", edges_of(g, component));
-  const std::string fill = likely ? "palette" : fmt::format("rgb \"{}\"", colour::blue);
+  picture.add_data(command("{}edges", id), edges_of(g, component));
+  const Script fill = likely ? command("palette") : command("rgb \"{}\"", colour::blue);
   picture.add(
-      fmt::format("plot ${0}edges using 1:2:3:4 with vectors nohead lw 0.8 lc rgb \"#AAAAAA\", "
-                  "${0} using 1:2:3{1} with points pt 7 ps variable lc {2}, "
-                  "${0} using 1:2:3 with points pt 6 lw 0.3 ps variable lc rgb \"#777777\"",
-                  id, likely ? ":4" : "", fill));
+      "plot ${0}edges using 1:2:3:4 with vectors nohead lw 0.8 lc rgb \"#AAAAAA\", "
+      "${0} using 1:2:3{1} with points pt 7 ps variable lc {2}, "
+      "${0} using 1:2:3 with points pt 6 lw 0.3 ps variable lc rgb \"#777777\"",
+      id, likely ? Literal(":4") : Literal(""), fill);
 }
 
 }  // namespace
@@ -104,13 +104,13 @@ std::string draw_tree(Picture picture, const std::string& title, const Genealogy
   const int height = title_height + count * each + axis_height;
   const bool likely = has_likelihoods(g);
   picture.begin(width, height);
-  picture.add(fmt::format("set multiplot\nset label 1 {} at screen 0.5,{:.4f} center noenhanced",
-                          in_quotes(title), 1 - 0.55 * title_height / height));
-  picture.add(fmt::format("set lmargin at screen {:.4f}\nset rmargin at screen {:.4f}", 94.0 / width,
-                          1 - (likely ? 140.0 : 30.0) / width));
+  picture.add("set multiplot\nset label 1 {} at screen 0.5,{:.4f} center noenhanced", gnuplot_string(title),
+              1 - 0.55 * title_height / height);
+  picture.add("set lmargin at screen {:.4f}\nset rmargin at screen {:.4f}", 94.0 / width,
+              1 - (likely ? 140.0 : 30.0) / width);
   const double end = g.time(g.generations() - 1), start = g.time(0);
   const double margin = std::max(1e-9, 0.03 * (end - start));
-  picture.add(fmt::format("set xrange [{:.9g}:{:.9g}]", start - margin, end + margin));
+  picture.add("set xrange [{:.9g}:{:.9g}]", start - margin, end + margin);
   if (likely)  // the colours of cividis (Nunez, Anderton, Renslow 2018), the same to any colour vision
     picture.add(
         "set cbrange [0:1]\nset palette defined (0 \"#00224E\", 0.25 \"#434E6C\", 0.5 \"#7D7C78\", 0.75 "
@@ -121,10 +121,10 @@ std::string draw_tree(Picture picture, const std::string& title, const Genealogy
   for (int i = 0; i < count; ++i) {
     const double top = 1 - static_cast<double>(title_height + i * each) / height;
     const double bottom = top - static_cast<double>(each - 12) / height;
-    picture.add(fmt::format("set tmargin at screen {:.4f}\nset bmargin at screen {:.4f}", top, bottom));
+    picture.add("set tmargin at screen {:.4f}\nset bmargin at screen {:.4f}", top, bottom);
     if (i > 0) picture.add("unset label\nunset colorbox");
-    picture.add(i + 1 == count ? "set format x \"%g\"\n" + name_of_width("t", 14.0 / height)
-                               : "set format x \"\"");
+    picture.add(i + 1 == count ? command("set format x \"%g\"\n{}", name_of_width("t", 14.0 / height))
+                               : command("set format x \"\""));
     draw_panel(picture, g, static_cast<std::size_t>(i), likely);
   }
   picture.add("unset multiplot");

@@ -11,10 +11,10 @@ namespace wienertree::app {
 namespace {
 
 struct Style {
-  const char* colour;
+  Literal colour;
   int point;  ///< gnuplot's filled circle, square, triangles, diamond; then the open ones
-  const char* band;
-  const char* text;  ///< darker where the colour is too light for letters on white
+  Literal band;
+  Literal text;  ///< darker where the colour is too light for letters on white
 };
 // Yellow of Okabe and Ito is left out: as a line on white it is hard to see.
 constexpr std::array<Style, 7> styles = {{{colour::blue, 7, "#D00072B2", colour::blue},
@@ -61,15 +61,16 @@ std::string with_minus_sign(const std::string& number) {
   return number.starts_with('-') ? "\u2212" + number.substr(1) : number;
 }
 
-std::string tic_text(double v) {
-  if (v >= 1e-3 && v < 1e5) return fmt::format("{:g}", v);
+Script tic_text(double v) {
+  if (v >= 1e-3 && v < 1e5) return command("{:g}", v);
   const double exponent = std::floor(std::log10(v) + 1e-9);
-  const std::string power = fmt::format("10^{{{}}}", with_minus_sign(fmt::format("{:.0f}", exponent)));
-  return is_power_of_ten(v) ? power : fmt::format("{:g}·{}", v / std::pow(10.0, exponent), power);
+  const Script power =
+      command("10^{{{}{:.0f}}}", exponent < 0 ? Literal("\u2212") : Literal(""), std::fabs(exponent));
+  return is_power_of_ten(v) ? power : command("{:g}·{}", v / std::pow(10.0, exponent), power);
 }
 
 // Decades, and 2 and 5 between them where there are few.
-std::string logarithmic_tics(const Range& range, const std::vector<double>& wanted) {
+Script logarithmic_tics(const Range& range, const std::vector<double>& wanted) {
   std::vector<double> at;
   if (!wanted.empty()) {
     // Powers of ten before others that stand too near to them.
@@ -91,11 +92,11 @@ std::string logarithmic_tics(const Range& range, const std::vector<double>& want
         if (const double v = s * std::pow(10.0, e); v >= range.low && v <= range.high && e % every == 0)
           at.push_back(v);
   }
-  std::vector<std::string> tics;
+  std::vector<Script> tics;
   for (const double v : at) {
-    tics.push_back(fmt::format("\"{}\" {:.12g}", tic_text(v), v));
+    tics.push_back(command("\"{}\" {:.12g}", tic_text(v), v));
   }
-  return fmt::format("({})", fmt::join(tics, ", "));
+  return command("({})", joined(tics));
 }
 
 const char* usual_x_label(const std::string& axis) {
@@ -128,7 +129,7 @@ void add_line(Picture& picture, const PlotLine& line, const StudyPlot& plot, dou
     columns[2].push_back(std::isnan(p.y.low) ? p.y.value : std::max(p.y.low, bottom));
     columns[3].push_back(std::isnan(p.y.high) ? p.y.value : p.y.high);
   }
-  picture.add_data(fmt::format("line{}", number), columns);
+  picture.add_data(command("line{}", number), columns);
   if (!line.fit) return;
   std::vector<double> ends;
   for (const LinePoint& p : line.points)
@@ -137,7 +138,7 @@ void add_line(Picture& picture, const PlotLine& line, const StudyPlot& plot, dou
       ends.push_back(p.x);
   const auto [low, high] = std::minmax_element(ends.begin(), ends.end());
   picture.add_data(
-      fmt::format("fit{}", number),
+      command("fit{}", number),
       std::array{std::vector{*low, *high}, std::vector{line.fit->at(*low), line.fit->at(*high)}});
 }
 
@@ -175,6 +176,7 @@ Frame frame_of(const StudyPlot& plot, const std::vector<PlotLine>& lines) {
       for (const double y : {p.y.value, p.y.low, p.y.high}) frame.y.include(y, plot.log_y);
       values.insert(p.x);
     }
+  if (!(frame.x.low <= frame.x.high)) frame.x = frame.y = {1, 1};  // nothing to draw
   frame.x.widen(plot.log_x, 0.04);
   frame.y.widen(plot.log_y, 0.05);
   if (plot.x == plot.along && values.size() <= 12) frame.x_values.assign(values.begin(), values.end());
@@ -195,8 +197,14 @@ std::string slope_text(const SlopeFit& fit) {
   return std::isnan(half) ? slope : fmt::format("{} ± {:.2f}", slope, half);
 }
 
-std::string draw_study_plot(Picture picture, const StudyPlot& plot, const std::vector<PlotLine>& lines,
+std::string draw_study_plot(Picture picture, const StudyPlot& asked, const std::vector<PlotLine>& lines,
                             PlotShape shape) {
+  StudyPlot plot = asked;
+  const bool positive = std::any_of(lines.begin(), lines.end(), [&](const PlotLine& line) {
+    return std::any_of(line.points.begin(), line.points.end(),
+                       [&](const auto& p) { return drawable(p, plot); });
+  });
+  plot.log_y = plot.log_y && positive;  // of nothing but values that are not positive there is no logarithm
   const bool wide = shape == PlotShape::wide;
   const Frame frame = frame_of(plot, lines);
   const int key_line = 20, key_height = wide ? 0 : key_line * static_cast<int>(lines.size()) + 10;
@@ -209,28 +217,27 @@ std::string draw_study_plot(Picture picture, const StudyPlot& plot, const std::v
   const double top = 1 - static_cast<double>(title_height) / height,
                bottom = static_cast<double>(key_height + 64) / height;
   picture.add(
-      fmt::format("set lmargin at screen {:.4f}\nset rmargin at screen {:.4f}\nset tmargin at screen {:.4f}\n"
-                  "set bmargin at screen {:.4f}",
-                  left / width, 1 - right / width, top, bottom));
+      "set lmargin at screen {:.4f}\nset rmargin at screen {:.4f}\nset tmargin at screen {:.4f}\n"
+      "set bmargin at screen {:.4f}",
+      left / width, 1 - right / width, top, bottom);
   for (std::size_t i = 0; i < title.size(); ++i)
-    picture.add(fmt::format("set label {} at screen {:.4f},{:.4f} left noenhanced font \",{}\"",
-                            in_quotes(title[i]), wide ? left / width : 0.02,
-                            1 - (wide ? 0.5 * title_height : 14 + 18.0 * static_cast<double>(i)) / height,
-                            wide ? 15 : 12));
+    picture.add("set label {} at screen {:.4f},{:.4f} left noenhanced font \",{}\"", gnuplot_string(title[i]),
+                wide ? left / width : 0.02,
+                1 - (wide ? 0.5 * title_height : 14 + 18.0 * static_cast<double>(i)) / height,
+                wide ? 15 : 12);
   if (plot.log_x) picture.add("set logscale x");
   if (plot.log_y) picture.add("set logscale y");
-  picture.add(fmt::format("set xrange [{:.9g}:{:.9g}]\nset yrange [{:.9g}:{:.9g}]", frame.x.low, frame.x.high,
-                          frame.y.low, frame.y.high));
-  if (plot.log_x) picture.add("set xtics " + logarithmic_tics(frame.x, frame.x_values));
-  if (plot.log_y) picture.add("set ytics " + logarithmic_tics(frame.y, {}));
+  picture.add("set xrange [{:.9g}:{:.9g}]\nset yrange [{:.9g}:{:.9g}]", frame.x.low, frame.x.high,
+              frame.y.low, frame.y.high);
+  if (plot.log_x) picture.add("set xtics {}", logarithmic_tics(frame.x, frame.x_values));
+  if (plot.log_y) picture.add("set ytics {}", logarithmic_tics(frame.y, {}));
   picture.add("set grid xtics ytics lt 1 lw 0.6 lc rgb \"#E4E4E4\"");
   picture.add(name_of_width(x_label(plot), static_cast<double>(key_height + 16) / height));
   if (wide)
     picture.add(name_of_height(y_label(plot), 16.0 / width));
   else  // above the axis, where there is room for a long name
-    picture.add(
-        fmt::format("set tics font \",11\"\nset label {} at screen 0.02,{:.4f} left noenhanced font \",11\"",
-                    in_quotes(y_label(plot)), 1 - (title_height - 14.0) / height));
+    picture.add("set tics font \",11\"\nset label {} at screen 0.02,{:.4f} left noenhanced font \",11\"",
+                gnuplot_string(y_label(plot)), 1 - (title_height - 14.0) / height);
   std::vector<SideLabel> labels;
   for (std::size_t i = 0; i < lines.size(); ++i) {
     const Style& style = styles[i % styles.size()];
@@ -242,26 +249,26 @@ std::string draw_study_plot(Picture picture, const StudyPlot& plot, const std::v
     if (wide) continue;
     const double y = static_cast<double>(key_height - 12 - key_line * static_cast<int>(i)) / height;
     picture.add(
-        fmt::format("set label {} at screen 0.07,{:.4f} left textcolor rgb \"{}\" noenhanced font \",12\" "
-                    "point pt {} ps 0.8 lc "
-                    "rgb \"{}\" offset 1.2,0",
-                    in_quotes(text_of(lines[i])), y, style.text, style.point, style.colour));
+        "set label {} at screen 0.07,{:.4f} left textcolor rgb \"{}\" noenhanced font \",12\" "
+        "point pt {} ps 0.8 lc "
+        "rgb \"{}\" offset 1.2,0",
+        gnuplot_string(text_of(lines[i])), y, style.text, style.point, style.colour);
   }
   if (wide) picture.add(labels_at_right(std::move(labels), 19.0 / (height - title_height - 64)));
-  std::vector<std::string> pieces;
+  std::vector<Script> pieces;
   for (std::size_t i = 0; i < lines.size(); ++i)
-    pieces.push_back(fmt::format("$line{} using 1:3:4 with filledcurves fillcolor rgb \"{}\"", i,
-                                 styles[i % styles.size()].band));
+    pieces.push_back(command("$line{} using 1:3:4 with filledcurves fillcolor rgb \"{}\"", i,
+                             styles[i % styles.size()].band));
   for (std::size_t i = 0; i < lines.size(); ++i) {
     const Style& style = styles[i % styles.size()];
     if (lines[i].fit)
       pieces.push_back(
-          fmt::format("$fit{} using 1:2 with lines lw 1.3 dashtype (7,5) lc rgb \"{}\"", i, style.colour));
-    pieces.push_back(fmt::format("$line{} using 1:2 with {} lw 1.8 pt {} ps {} lc rgb \"{}\"", i,
-                                 lines[i].fit ? "points" : "linespoints", style.point, wide ? 0.9 : 0.7,
-                                 style.colour));
+          command("$fit{} using 1:2 with lines lw 1.3 dashtype (7,5) lc rgb \"{}\"", i, style.colour));
+    pieces.push_back(command("$line{} using 1:2 with {} lw 1.8 pt {} ps {} lc rgb \"{}\"", i,
+                             lines[i].fit ? Literal("points") : Literal("linespoints"), style.point,
+                             wide ? 0.9 : 0.7, style.colour));
   }
-  picture.add(fmt::format("plot {}", fmt::join(pieces, ", ")));
+  picture.add("plot {}", joined(pieces));
   return picture.draw();
 }
 
