@@ -6,6 +6,7 @@
 #include <cstring>
 #include <fstream>
 
+#include "run_files.hpp"
 #include "wienertree/numeric/error.hpp"
 #include "wienertree/numeric/memory.hpp"
 #include "wienertree/numeric/read_all.hpp"
@@ -76,6 +77,7 @@ void Checkpoint::write(std::string_view state) {
 
 std::string read_checkpoint(const std::string& file, const Json& run) {
   const auto refuse = [&](const std::string& message) { throw InputError(message, "--resume", file); };
+  note_input("--resume", file);
   std::ifstream in(file, std::ios::binary);
   if (!in) refuse("cannot be opened");
   // Held twice while it is read: as bytes, and as what they stand for.

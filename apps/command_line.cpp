@@ -10,7 +10,9 @@
 
 #include "interruption.hpp"
 #include "output.hpp"
+#include "run_files.hpp"
 #include "wienertree/model/text/location.hpp"
+#include "wienertree/model/text/printable.hpp"
 #include "wienertree/numeric/memory.hpp"
 
 namespace wienertree::app {
@@ -93,11 +95,14 @@ InputError usage_error(const CLI::App& app, const CLI::ParseError& error) {
   return {error.what(), reached.name};
 }
 
+// The library names an option as its field is called; here it is called as it is typed.
+InputError with_option_spelled(const InputError& error, const CLI::App& app) {
+  const bool option = !error.where().empty() && app.get_option_no_throw("--" + error.where()) != nullptr;
+  return option ? InputError(error.message(), "--" + error.where(), error.value()) : error;
+}
+
 int complain(const std::string& message, int code) {
-  std::string line = "wienertree: " + message;
-  for (char& c : line)
-    if (static_cast<unsigned char>(c) < 0x20 || c == 0x7f) c = ' ';
-  std::fprintf(stderr, "%s\n", line.c_str());
+  tell(text::printable("wienertree: " + message) + '\n');
   return code;
 }
 
@@ -130,7 +135,15 @@ CLI::Option* add_text(CLI::App& app, const std::string& name, std::optional<std:
                       const std::string& type, const std::string& help) {
   return app
       .add_option_function<std::string>(
-          name, [&target](const std::string& text) { target = text; }, help)
+          name,
+          [&target, name, type](const std::string& text) {
+            const bool file = type.find("FILE") != std::string::npos || type == "DIR";
+            if (file && text.empty())
+              throw InputError("a file name is needed, and this one is empty", name.substr(0, name.find(',')),
+                               "''");
+            target = text;
+          },
+          help)
       ->type_name(type);
 }
 
@@ -189,6 +202,7 @@ void parse_words(CLI::App& app, std::vector<std::string> words) {
 }
 
 int run_program(CLI::App& app, int argc, char** argv) {
+  const RunFiles files;
   try {
     try {
       app.parse(argc, argv);
@@ -209,7 +223,7 @@ int run_program(CLI::App& app, int argc, char** argv) {
   } catch (const SaidAlready& said) {
     return said.exit_code;
   } catch (const InputError& error) {
-    return complain(error.what(), 2);
+    return complain(with_option_spelled(error, *innermost(app).app).what(), 2);
   } catch (const Error& error) {
     return complain(error.what(), 1);
   } catch (const std::bad_alloc&) {

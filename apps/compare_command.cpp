@@ -214,10 +214,10 @@ void compare_and_write(const CompareArguments& a) {
   if (plot) plot->publish();
   for (std::size_t m = 0; m < all.size(); ++m)
     for (const std::string& text : comparison.warnings[m])
-      std::fputs(fmt::format("warning: {}: {}\n", all[m].label, text).c_str(), stderr);
+      tell(fmt::format("warning: {}: {}\n", all[m].label, text));
   for (const std::string& text : undecided(all, comparison))
-    std::fputs(fmt::format("warning: {}\n", text).c_str(), stderr);
-  if (!a.quiet) std::fputs(summary_of(a, all, comparison).c_str(), stderr);
+    tell(fmt::format("warning: {}\n", text));
+  if (!a.quiet) tell(summary_of(a, all, comparison));
 }
 
 }  // namespace

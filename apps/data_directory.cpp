@@ -7,8 +7,9 @@
 #include <cstdlib>
 #include <system_error>
 
-#include "wienertree/numeric/error.hpp"
+#include "run_files.hpp"
 #include "wienertree/model/text/location.hpp"
+#include "wienertree/numeric/error.hpp"
 
 namespace wienertree::app {
 namespace {
@@ -42,11 +43,17 @@ fs::path installed_data(const fs::path& binary) {
 
 fs::path bundled_file(const std::string& name, const std::string& folder, const std::string& extension,
                       const std::string& what, const std::string& where) {
-  if (name.find('/') != std::string::npos || name.ends_with(extension)) return name;
+  if (name.empty()) throw InputError("the name is empty", where, "''");
+  if (name.find('/') != std::string::npos || name.ends_with(extension)) {
+    note_input(where, name);
+    return name;
+  }
   const std::vector<std::string> names = bundled_names(folder, extension);
   if (std::find(names.begin(), names.end(), name) == names.end())
     throw InputError("no bundled " + what + " of this name" + text::suggestion(name, names), where, name);
-  return data_directory() / folder / (name + extension);
+  fs::path file = data_directory() / folder / (name + extension);
+  note_input(where, file.string());
+  return file;
 }
 
 }  // namespace

@@ -2,6 +2,8 @@
 
 #include <fstream>
 
+#include "run_files.hpp"
+
 namespace wienertree::app {
 namespace {
 
@@ -25,6 +27,7 @@ Table signal_table(const Model& model, const ObservationPath& signal) {
 }
 
 ObservationPath read_signal(const std::string& file, const Model& model) {
+  note_input("--signal", file);
   std::ifstream in(file);
   if (!in) throw InputError("cannot be opened", file);
   const std::vector<std::string> columns = signal_columns(model);

@@ -7,6 +7,7 @@
 #include <system_error>
 
 #include "interruption.hpp"
+#include "run_files.hpp"
 
 namespace wienertree::app {
 
@@ -56,6 +57,7 @@ class StandardInputWindows final : InputStream, public WindowSource {
 
 std::unique_ptr<WindowSource> windows_of(const std::string& observations, const Model& model,
                                          std::optional<std::size_t> steps, bool resumed) {
+  note_input("--observations", observations);
   if (observations != "-") return open_windows(observations, model, steps);
   if (steps)
     throw InputError("needs the whole record; with --observations - every row ends a step", "--steps",

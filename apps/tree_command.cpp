@@ -174,7 +174,7 @@ void write_tree(const TreeArguments& a) {
   if (dot) dot->publish();
   if (graphml) graphml->publish();
   if (plot) plot->publish();
-  if (!a.quiet) std::fputs(summary(genealogy).c_str(), stderr);
+  if (!a.quiet) tell(summary(genealogy));
 }
 
 }  // namespace

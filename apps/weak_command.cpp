@@ -158,8 +158,7 @@ void approximate_and_write(const WeakCommandArguments& a) {
   output.publish();
   if (!a.quiet) tell(a.weak, problem, outcome, took);
   if (outcome.warning.empty()) return;
-  std::fputs(fmt::format("warning: tolerance {:g}: {}\n", *a.weak.tolerance, outcome.warning).c_str(),
-             stderr);
+  app::tell(fmt::format("warning: tolerance {:g}: {}\n", *a.weak.tolerance, outcome.warning));
   throw SaidAlready{1};
 }
 
