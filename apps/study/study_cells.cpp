@@ -10,6 +10,7 @@
 #include <set>
 
 #include "../data_directory.hpp"
+#include "wienertree/model/text/printable.hpp"
 #include "wienertree/model/text_model.hpp"
 
 namespace wienertree::app {
@@ -21,7 +22,10 @@ std::string shell_word(const std::string& text) {
     return std::isalnum(static_cast<unsigned char>(c)) != 0 ||
            std::string_view("._-+/:=,").find(c) != std::string_view::npos;
   });
-  return plain ? text : "'" + text + "'";
+  if (plain) return text;
+  std::string quoted = "'";
+  for (const char c : text) quoted += c == '\'' ? std::string("'\\''") : std::string(1, c);
+  return quoted + "'";
 }
 
 bool is_flag(const CLI::App& app, const std::string& name) {
@@ -106,11 +110,11 @@ std::string words_of(const CellOptions& options) {
   for (const auto& [name, value] : options) {
     if (name == "model" || value == "false") continue;
     if (name.starts_with("set."))
-      words += fmt::format(" --set {}={}", name.substr(4), value);
+      words += fmt::format(" --set {}", shell_word(fmt::format("{}={}", name.substr(4), value)));
     else
       words += value == "true" ? " --" + name : fmt::format(" --{} {}", name, shell_word(value));
   }
-  return words;
+  return text::printable(words);
 }
 
 CellOptions with(CellOptions options, const StudyOptions& over) {

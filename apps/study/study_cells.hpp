@@ -38,6 +38,7 @@ struct StudyCell {
   std::size_t series = 0;
   CellOptions options;
   std::string key;             ///< "benes --steps 10 --functional picard": what names it in tables
+  std::string identity;        ///< identity_of_runs: what else decides its runs
   std::uint32_t launches = 1;  ///< 1 where nothing is drawn
   std::shared_ptr<const FilterCell> filter;
   std::shared_ptr<const WeakCell> weak;

@@ -1,12 +1,11 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cstdio>
 #include <filesystem>
 #include <fstream>
+#include <map>
 #include <memory>
 #include <sstream>
-#include <system_error>
 #include <thread>
 
 #include "../command_line.hpp"
@@ -15,9 +14,10 @@
 #include "../density_plot.hpp"
 #include "../output.hpp"
 #include "../table.hpp"
+#include "study_directory.hpp"
+#include "study_identity.hpp"
 #include "study_page.hpp"
 #include "study_plot.hpp"
-#include "wienertree/version.hpp"
 
 namespace wienertree::app {
 namespace {
@@ -37,69 +37,36 @@ std::string contents_of(const fs::path& file) {
   return std::move(all).str();
 }
 
-void write_file(const fs::path& file, std::string content) {
-  OutputFile output("--output", file.string());
-  output.stage(std::move(content));
-  output.publish();
-}
-
-// FNV-1a, to see whether a file is still the same.
-std::string fingerprint(const std::string& text) {
-  std::uint64_t hash = 0xcbf29ce484222325U;
-  for (const char c : text) hash = (hash ^ static_cast<unsigned char>(c)) * 0x100000001b3U;
-  return fmt::format("{:016x}", hash);
-}
-
-// Everything but the options that decides what a run of this study gives.
-Json problem_of(const Study& study, const std::vector<StudyCell>& cells, const ModelShelf& models) {
-  Json problem;
-  problem["version"] = WIENERTREE_VERSION;
-  problem["command"] = study.weak ? "weak" : "filter";
-  const StudyReference& r = study.reference;
-  problem["reference"] = fmt::format("{} {}", static_cast<int>(r.kind), r.expression);
-  for (const StudyOption& option : r.options) problem["reference run"][option.name] = option.values;
-  for (const auto& [payoff, value] : r.by_payoff) problem["reference by payoff"][payoff] = value;
-  const auto add_file = [&](const std::string& name, const fs::path& file) {
-    problem["files"][name] = fingerprint(contents_of(file));
-  };
-  const StudyObservations& o = study.observations;
-  if (o.file)
-    add_file(*o.file, study.directory.empty() ? fs::path(*o.file) : fs::path(study.directory) / *o.file);
-  else if (!study.weak)
-    problem["observations"] = {{"model", o.model.value_or("")},
-                               {"horizon", o.horizon},
-                               {"steps", o.steps},
-                               {"keep", o.keep},
-                               {"seed", o.seed}};
-  const auto add_model = [&](const std::string& name) { add_file(name, model_file(models.file_of(name))); };
-  if (o.model) add_model(*o.model);
-  for (const StudyCell& cell : cells) add_model(option_of(cell.options, "model"));
-  return problem;
-}
-
-// A directory belongs to one problem: runs of another would be taken for this one's. Sweeps may grow.
-void claim_directory(const fs::path& directory, const Json& problem) {
-  const fs::path file = directory / "problem.json";
-  Json all = problem;
-  if (fs::exists(file)) {
-    const Json before = Json::parse(contents_of(file), nullptr, false);
-    if (!before.is_object()) throw InputError("is not what a study left there", "--output", file.string());
-    for (const auto& [key, value] : problem.items()) {
-      if (key != "files" && before.value(key, Json()) != value)
-        throw InputError(
-            "holds runs of another study or version (" + key + " differs): give another directory",
-            "--output", directory.string());
-    }
-    const Json files = before.value("files", Json::object());
-    for (const auto& [name, print] : files.items()) {
-      if (problem["files"].contains(name) && problem["files"][name] != print)
-        throw InputError("holds runs from before this file was changed: give another directory",
-                         "--output " + directory.string(), name);
-      all["files"][name] = print;
-    }
-    if (all == before) return;
+// The files of a study, opened before anything is computed.
+class StudyFiles {
+ public:
+  StudyFiles(const fs::path& directory, const std::vector<std::string>& names) {
+    for (const std::string& name : names)
+      files_.emplace(name, std::make_unique<OutputFile>("--output", (directory / name).string()));
   }
-  write_file(file, all.dump(2) + '\n');
+  void write(const std::string& name, std::string content) {
+    OutputFile& file = *files_.at(name);
+    file.stage(std::move(content));
+    file.publish();
+  }
+
+ private:
+  std::map<std::string, std::unique_ptr<OutputFile>> files_;
+};
+
+constexpr const char* journal_name = "runs.csv";
+
+std::string picture_name(std::size_t plot, const char* ending) {
+  return fmt::format("plot-{}{}", plot + 1, ending);
+}
+
+// All but the journal.
+std::vector<std::string> names_of_files(const Study& study) {
+  std::vector<std::string> names = {"table.csv", "slopes.csv", "index.html"};
+  if (!study.claims.empty()) names.emplace_back("claims.csv");
+  for (std::size_t p = 0; p < study.plots.size(); ++p)
+    for (const char* ending : {".svg", ".png"}) names.push_back(picture_name(p, ending));
+  return names;
 }
 
 // The laws themselves: a panel a cell, of the first launch on the first path.
@@ -147,22 +114,25 @@ std::string summary_of(const Study& study, const StudyResults& results, std::siz
         study.claims[c].low, study.claims[c].high,
         o.inside == study.claims[c].holds ? "" : ", which the study says otherwise", study.claims[c].text);
   }
+  for (const std::string& note : results.notes) text += fmt::format("  note: {}\n", note);
   return text + fmt::format("  {}\n", page.string());
 }
 
 void study_and_write(const StudyArguments& a) {
   const Study study = read_study(study_file(a.study).string(), a.full);
   ModelShelf models(study.directory);
-  const std::vector<StudyCell> cells = study_cells(study, models);
+  std::vector<StudyCell> cells = study_cells(study, models);
   StudyData data(study, cells, models);
-  if (!study.plots.empty()) Picture("plot.svg");  // before anything is computed: is there a gnuplot?
-  const fs::path directory = *a.output;
-  std::error_code failure;
-  fs::create_directories(directory, failure);
-  if (failure || !fs::is_directory(directory))
-    throw InputError("no directory can be made there", "--output", *a.output);
+  for (StudyCell& cell : cells) cell.identity = identity_of_runs(study, cell, data, models);
+  if (!study.plots.empty()) Picture("plot.svg");  // is there a gnuplot?
+  rehearse_results(study, cells, data);
+  const std::vector<std::string> names = names_of_files(study);
+  std::vector<std::string> with_journal = names;
+  with_journal.emplace_back(journal_name);
+  const StudyDirectory claimed(*a.output, study.name, with_journal);
+  const fs::path& directory = claimed.path();
   StudyJournal journal(directory.string(), study.quantities);
-  claim_directory(directory, problem_of(study, cells, models));
+  StudyFiles files(directory, names);
   const std::size_t before = journal.records().size();
   const std::size_t threads = a.threads.value_or(std::max(1U, std::thread::hardware_concurrency()));
   const std::vector<RunRecord> runs = run_study(study, cells, data, journal, threads, !a.quiet);
@@ -172,24 +142,22 @@ void study_and_write(const StudyArguments& a) {
   std::vector<StudyDownload> downloads = {{"table.csv", points_table(study, results)},
                                           {"slopes.csv", slopes_table(study, results)}};
   if (!study.claims.empty()) downloads.push_back({"claims.csv", claims_table(study, results)});
-  for (const StudyDownload& download : downloads) write_file(directory / download.name, download.content);
+  for (const StudyDownload& download : downloads) files.write(download.name, download.content);
   std::vector<StudyPicture> pictures;
   for (std::size_t p = 0; p < study.plots.size(); ++p) {
     StudyPicture picture;
-    const std::string name = fmt::format("plot-{}", p + 1);
-    picture.png = name + ".png";
+    picture.png = picture_name(p, ".png");
     picture.wide = draw(study, p, cells, results, data, "plot.svg", PlotShape::wide);
     picture.narrow = draw(study, p, cells, results, data, "plot.svg", PlotShape::narrow);
-    write_file(directory / (name + ".svg"), picture.wide);
-    write_file(directory / picture.png, draw(study, p, cells, results, data, "plot.png", PlotShape::wide));
+    files.write(picture_name(p, ".svg"), picture.wide);
+    files.write(picture.png, draw(study, p, cells, results, data, "plot.png", PlotShape::wide));
     pictures.push_back(std::move(picture));
   }
-  const std::string all_runs = contents_of(directory / "runs.csv");
+  const std::string all_runs = contents_of(directory / journal_name);
   constexpr std::size_t most_embedded = 1'000'000;
-  downloads.push_back({"runs.csv", all_runs, all_runs.size() <= most_embedded});
-  write_file(directory / "index.html", study_page(study, results, pictures, downloads));
-  if (!a.quiet)
-    std::fputs(summary_of(study, results, computed, runs.size(), directory / "index.html").c_str(), stderr);
+  downloads.push_back({journal_name, all_runs, all_runs.size() <= most_embedded});
+  files.write("index.html", study_page(study, results, pictures, downloads));
+  if (!a.quiet) tell(summary_of(study, results, computed, runs.size(), fs::path(*a.output) / "index.html"));
 }
 
 std::string bundled_studies() {

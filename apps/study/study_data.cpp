@@ -6,6 +6,7 @@
 #include <cmath>
 #include <limits>
 
+#include "../run_files.hpp"
 #include "wienertree/filter/simulate.hpp"
 #include "wienertree/numeric/memory.hpp"
 #include "wienertree/run/window_source.hpp"
@@ -168,6 +169,7 @@ StudyData::StudyData(const Study& study, const std::vector<StudyCell>& cells, Mo
     : study_(study) {
   using enum StudyReference::Kind;
   if (!study.weak && !study.observations.file) paths_ = study.observations.paths;
+  if (!study.weak && study.observations.file) note_input("observations", observation_file(study));
   for (const StudyCell& cell : cells) {
     if (cell.filter) {
       const std::string key = observation_key(study, cell);
@@ -232,6 +234,17 @@ void StudyData::require_inside_record(const StudyCell& cell, double until) {
 
 StudyData::~StudyData() = default;
 
+std::string observation_file(const Study& study) {
+  const std::string& file = *study.observations.file;
+  return file.starts_with("/") || study.directory.empty() ? file : study.directory + "/" + file;
+}
+
+StudyData::Reference StudyData::reference(const StudyCell& cell) const {
+  const Problem& problem = *problems_.at(truth_key(cell));
+  return {problem.reference ? &*problem.reference : nullptr,
+          problem.weak_reference ? &*problem.weak_reference : nullptr, problem.value};
+}
+
 const std::vector<Quantity>& StudyData::quantities(const StudyCell& cell) const {
   return problems_.at(truth_key(cell))->quantities;
 }
@@ -243,9 +256,8 @@ const ObservationPath& StudyData::observations(const StudyCell& cell, std::size_
     const StudyObservations& o = study_.observations;
     const Model& model = *simulated_.at(key);
     if (o.file) {
-      const bool relative = !o.file->starts_with("/") && !study_.directory.empty();
-      path.path = read_observations(relative ? study_.directory + "/" + *o.file : *o.file,
-                                    model.observation_dimension(), model.observation);
+      path.path =
+          read_observations(observation_file(study_), model.observation_dimension(), model.observation);
     } else {
       path.path = simulate(model, o.horizon, o.steps, o.keep, o.seed, static_cast<std::uint32_t>(number))
                       .observations;

@@ -48,6 +48,9 @@ void run_until(Filter& filter, const ObservationWindows& windows, std::optional<
 /// quantity
 double quantity_of(const Quantity& quantity, Filter& filter, const KeptPosterior* truth);
 
+/// Where the record lies that a study filters, if it is not simulated.
+std::string observation_file(const Study& study);
+
 class StudyData {
  public:
   /// @throws InputError for a reference that does not apply, a quantity that is unknown, a file that cannot
@@ -56,6 +59,13 @@ class StudyData {
   ~StudyData();
   std::size_t paths() const { return paths_; }
   const std::vector<Quantity>& quantities(const StudyCell& cell) const;
+  /// What the runs of a cell are compared with; null where it is no run, no value where it is one.
+  struct Reference {
+    const FilterCell* filter = nullptr;
+    const WeakCell* weak = nullptr;
+    std::optional<double> value;
+  };
+  Reference reference(const StudyCell& cell) const;
   /// May be called by several threads. @throws InputError, RunError as simulate and filters
   const ObservationPath& observations(const StudyCell& cell, std::size_t path);
   const StudyTruth& truth(const StudyCell& cell, std::size_t path);

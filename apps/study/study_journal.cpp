@@ -2,7 +2,6 @@
 
 #include <fcntl.h>
 #include <fmt/format.h>
-#include <sys/file.h>
 #include <unistd.h>
 
 #include <cerrno>
@@ -13,7 +12,6 @@
 #include <sstream>
 #include <system_error>
 
-#include "../output.hpp"
 #include "wienertree/numeric/error.hpp"
 #include "wienertree/numeric/memory.hpp"
 #include "wienertree/numeric/read_all.hpp"
@@ -61,13 +59,13 @@ std::string csv_field(const std::string& text) {
 }
 
 std::string StudyJournal::header() const {
-  std::string line = "cell,path,launch";
+  std::string line = "identity,cell,path,launch";
   for (const std::string& q : quantities_) line += fmt::format(",{0},{0}_reference", q);
   return line + ",nodes,ode_solves,seconds\n";
 }
 
 std::string StudyJournal::line_of(const RunRecord& r) const {
-  std::string line = fmt::format("{},{},{}", csv_field(r.cell), r.path, r.launch);
+  std::string line = fmt::format("{},{},{},{}", r.identity, csv_field(r.cell), r.path, r.launch);
   for (std::size_t q = 0; q < quantities_.size(); ++q) {
     add_number(line, r.value[q]);
     add_number(line, r.truth[q]);
@@ -81,12 +79,13 @@ RunRecord StudyJournal::parse(const std::string& line, std::size_t number) const
   const auto bad = [&](const std::string& what) {
     return InputError(what, fmt::format("{}:{}", file_, number), line.substr(0, 80));
   };
-  if (fields.size() != 6 + 2 * quantities_.size()) throw bad("not the fields of a run");
+  if (fields.size() != 7 + 2 * quantities_.size()) throw bad("not the fields of a run");
   RunRecord r;
-  r.cell = fields[0];
-  if (!parse_whole(fields[1], r.path) || !parse_whole(fields[2], r.launch))
+  r.identity = fields[0];
+  r.cell = fields[1];
+  if (!parse_whole(fields[2], r.path) || !parse_whole(fields[3], r.launch))
     throw bad("path and launch must be whole numbers");
-  std::size_t at = 3;
+  std::size_t at = 4;
   const auto next = [&] {
     double value = std::numeric_limits<double>::quiet_NaN();
     const std::string& text = fields[at++];
@@ -106,12 +105,9 @@ RunRecord StudyJournal::parse(const std::string& line, std::size_t number) const
 // After the constructor it delegates to, what this one opens is closed by the destructor also where it throws.
 StudyJournal::StudyJournal(const std::string& directory, std::vector<std::string> quantities)
     : StudyJournal(directory + "/runs.csv", std::move(quantities), Nothing{}) {
-  lock_ = ::open(directory.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
-  if (lock_ < 0) throw InputError("cannot be opened: " + reason(), "--output", directory);
-  if (::flock(lock_, LOCK_EX | LOCK_NB) != 0)
-    throw InputError("another study is running there", "--output", directory);
-  descriptor_ = ::open(file_.c_str(), O_RDWR | O_CREAT | O_APPEND | O_CLOEXEC, 0666);
+  descriptor_ = ::open(file_.c_str(), O_RDWR | O_CREAT | O_APPEND | O_NOFOLLOW | O_CLOEXEC, 0666);
   if (descriptor_ < 0) throw InputError("cannot be written: " + reason(), "--output", file_);
+  whole_ = std::make_unique<OutputFile>("--output", file_);
   std::ifstream in(file_, std::ios::binary);
   std::string text = read_all(in, static_cast<std::size_t>(memory_limit() / 8), file_);
   const std::size_t whole = text.rfind('\n') == std::string::npos ? 0 : text.rfind('\n') + 1;
@@ -132,7 +128,6 @@ StudyJournal::StudyJournal(const std::string& directory, std::vector<std::string
 
 StudyJournal::~StudyJournal() {
   if (descriptor_ >= 0) ::close(descriptor_);
-  if (lock_ >= 0) ::close(lock_);
 }
 
 void StudyJournal::append(const RunRecord& record) { write_line(line_of(record)); }
@@ -152,9 +147,8 @@ void StudyJournal::write_line(const std::string& line) {
 void StudyJournal::rewrite(const std::vector<RunRecord>& records) {
   std::string text = header();
   for (const RunRecord& record : records) text += line_of(record);
-  OutputFile output("--output", file_);
-  output.stage(std::move(text));
-  output.publish();
+  whole_->stage(std::move(text));
+  whole_->publish();
   records_ = records;
 }
 

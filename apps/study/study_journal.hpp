@@ -1,15 +1,19 @@
 #pragma once
 /// The runs of a study on disk: a row each, written as it is finished, so that what was killed can go on.
 #include <cstdint>
+#include <memory>
 #include <string>
 #include <utility>
 #include <vector>
+
+#include "../output.hpp"
 
 namespace wienertree::app {
 
 /// One launch of a cell on one observation path.
 struct RunRecord {
-  std::string cell;  ///< StudyCell::key
+  std::string identity;  ///< StudyCell::identity
+  std::string cell;      ///< StudyCell::key
   std::size_t path = 0;
   std::uint32_t launch = 0;
   std::vector<double> value, truth;               ///< one a quantity; NaN: there is none
@@ -19,10 +23,9 @@ struct RunRecord {
 /// runs.csv in the directory of a study.
 class StudyJournal {
  public:
-  /// Reads what is there and takes the directory for this process. A last line without an end is what a
-  /// killed run left: it is cut off.
-  /// @throws InputError if another study is running there, or the file is not that of a study of these
-  /// quantities, naming the line
+  /// Reads what is there. A last line without an end is what a killed run left: it is cut off.
+  /// @param directory is this process's (StudyDirectory)
+  /// @throws InputError if the file is not that of a study of these quantities, naming the line
   StudyJournal(const std::string& directory, std::vector<std::string> quantities);
   ~StudyJournal();
   StudyJournal(const StudyJournal&) = delete;
@@ -47,7 +50,8 @@ class StudyJournal {
   std::string file_;
   std::vector<std::string> quantities_;
   std::vector<RunRecord> records_;
-  int descriptor_ = -1, lock_ = -1;
+  int descriptor_ = -1;
+  std::unique_ptr<OutputFile> whole_;
 };
 
 /// Text as a field of CSV, in quotes where it must be (RFC 4180).

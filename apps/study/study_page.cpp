@@ -9,6 +9,7 @@
 #include <regex>
 
 #include "study_plot.hpp"
+#include "wienertree/model/text/printable.hpp"
 #include "wienertree/version.hpp"
 
 namespace wienertree::app {
@@ -48,7 +49,7 @@ footer { margin-top: 3rem; font-size: .8rem; color: #666; }
 
 std::string escaped(const std::string& text) {
   std::string out;
-  for (const char c : text) {
+  for (const char c : text::printable(text, text::LineEnds::kept)) {
     switch (c) {
       case '&':
         out += "&amp;";
@@ -61,6 +62,9 @@ std::string escaped(const std::string& text) {
         break;
       case '"':
         out += "&quot;";
+        break;
+      case '\'':
+        out += "&#39;";
         break;
       default:
         out += c;
@@ -97,8 +101,9 @@ std::string inlined(const std::string& svg, const std::string& prefix, const std
   // The size is that of the page; the view box keeps the proportions.
   body = std::regex_replace(body, std::regex("<svg([^>]*?)\\s+width=\"[0-9]+\" height=\"[0-9]+\""), "<svg$1",
                             std::regex_constants::format_first_only);
-  body = std::regex_replace(body, std::regex("<title>[^<]*</title>"), "<title>" + escaped(what) + "</title>",
-                            std::regex_constants::format_first_only);
+  const std::size_t title = body.find("<title>"), end = body.find("</title>");
+  if (title != std::string::npos && end != std::string::npos)
+    body.replace(title, end - title, "<title>" + escaped(what));
   return body;
 }
 
@@ -148,6 +153,13 @@ std::string claims_section(const Study& study, const StudyResults& results) {
         number(study.claims[c].high), o.inside ? "yes" : "no", o.inside ? "holds" : "does not hold");
   }
   return html + "</table></div>\n";
+}
+
+std::string notes_section(const StudyResults& results) {
+  if (results.notes.empty()) return {};
+  std::string html = "<h2>Left out</h2>\n<ul>\n";
+  for (const std::string& note : results.notes) html += fmt::format("<li>{}</li>\n", escaped(note));
+  return html + "</ul>\n";
 }
 
 std::string slopes_section(const Study& study, const StudyResults& results) {
@@ -215,8 +227,8 @@ std::string study_page(const Study& study, const StudyResults& results,
     html += fmt::format("<p><span class=\"who\">Found:</span> {}</p>\n", prose(study.finding));
   for (std::size_t p = 0; p < pictures.size(); ++p)
     html += figure(study.plots[p], results.lines[p], pictures[p], p + 1);
-  html += claims_section(study, results) + slopes_section(study, results) + table_section(study, results) +
-          downloads_section(downloads);
+  html += claims_section(study, results) + notes_section(results) + slopes_section(study, results) +
+          table_section(study, results) + downloads_section(downloads);
   html += fmt::format("<h2>Study file</h2>\n<details><summary>{}.toml</summary>\n<pre>{}</pre></details>\n",
                       escaped(study.name), escaped(study.source));
   return html +

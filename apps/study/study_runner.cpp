@@ -23,9 +23,9 @@ struct Task {
   std::uint32_t launch;
 };
 
-using Key = std::tuple<std::string, std::size_t, std::uint32_t>;
-Key key_of(const Task& task) { return {task.cell->key, task.path, task.launch}; }
-Key key_of(const RunRecord& record) { return {record.cell, record.path, record.launch}; }
+using Key = std::tuple<std::string, std::string, std::size_t, std::uint32_t>;
+Key key_of(const Task& task) { return {task.cell->identity, task.cell->key, task.path, task.launch}; }
+Key key_of(const RunRecord& record) { return {record.identity, record.cell, record.path, record.launch}; }
 
 // Each run once, also where two series share it.
 std::vector<Task> tasks_of(const std::vector<StudyCell>& cells, std::size_t paths) {
@@ -39,7 +39,8 @@ std::vector<Task> tasks_of(const std::vector<StudyCell>& cells, std::size_t path
   for (const StudyCell& cell : cells)
     for (std::size_t path = 0; path < paths; ++path)
       for (std::uint32_t launch = 0; launch < cell.launches; ++launch)
-        if (known.emplace(cell.key, path, launch).second) tasks.push_back({&cell, path, launch});
+        if (known.emplace(cell.identity, cell.key, path, launch).second)
+          tasks.push_back({&cell, path, launch});
   return tasks;
 }
 
@@ -54,7 +55,7 @@ RunRecord run_filter_task(const Task& task, StudyData& data) {
   const FilterCell& cell = *task.cell->filter;
   const StudyTruth& truth = data.truth(*task.cell, task.path);
   const ObservationWindows windows = data.windows(cell, data.observations(*task.cell, task.path));
-  RunRecord record{task.cell->key, task.path, task.launch, {}, truth.values, 0, 0, 0};
+  RunRecord record{task.cell->identity, task.cell->key, task.path, task.launch, {}, truth.values, 0, 0, 0};
   FilterOptions options = cell.setup.options;
   options.launch = task.launch;
   const double began = thread_seconds();
@@ -70,8 +71,15 @@ RunRecord run_filter_task(const Task& task, StudyData& data) {
 }
 
 RunRecord run_weak_task(const Task& task, const Study& study, StudyData& data) {
-  RunRecord record{
-      task.cell->key, task.path, task.launch, {}, data.truth(*task.cell, task.path).values, 0, 0, 0};
+  RunRecord record{task.cell->identity,
+                   task.cell->key,
+                   task.path,
+                   task.launch,
+                   {},
+                   data.truth(*task.cell, task.path).values,
+                   0,
+                   0,
+                   0};
   const double began = thread_seconds();
   const WeakOutcome outcome = run_weak_cell(*task.cell->weak, task.launch);
   record.seconds = thread_seconds() - began;

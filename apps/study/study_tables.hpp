@@ -40,10 +40,17 @@ struct StudyResults {
   std::vector<StudyPoint> points;
   std::vector<std::vector<PlotLine>> lines;  ///< one list a plot; empty for a density
   std::vector<ClaimOutcome> claims;
+  std::vector<std::string> notes;  ///< what is left out, and why
 };
 
-/// @throws InputError for an axis that is no number in a cell, a line that no plot has, a measure that does
-/// not apply
+/// Goes through tables, lines and claims with made-up numbers, before anything is computed.
+/// @throws InputError for an axis that is no number in a cell, or not positive and logarithmic; a line that no plot
+/// has; a claim that no line decides; a measure that applies to no series; a plot without lines
+void rehearse_results(const Study& study, const std::vector<StudyCell>& cells, const StudyData& data);
+
+/// A series to which a measure does not apply (a deviation over launches where nothing is drawn) has no number
+/// there, and a note says so; the same holds for points that have no place on a logarithmic axis. A claim that the
+/// numbers leave undecided does not hold.
 StudyResults study_results(const Study& study, const std::vector<StudyCell>& cells,
                            const std::vector<RunRecord>& records);
 
