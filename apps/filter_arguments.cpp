@@ -51,7 +51,6 @@ void refuse_tree_options(const FilterArguments& a, const std::string& reason) {
 
 void refuse_random_options(const FilterArguments& a, const std::string& reason) {
   refuse_if(a.launches.has_value(), "--launches", reason + ": it is deterministic");
-  refuse_if(a.seed.has_value(), "--seed", reason + ": it is deterministic");
 }
 
 void refuse_thinning_options(const FilterArguments& a, const std::string& reason) {

@@ -142,11 +142,12 @@ void filter_and_write(const FilterCommandArguments& a) {
   }
   if (plot) plot->publish();
   // Nodes are never left out without a word.
-  if (a.quiet && run.statistics.dropped_nodes > 0) std::fputs(dropped_line(run).c_str(), stderr);
-  for (const std::string& text : run.warnings) std::fputs(fmt::format("warning: {}\n", text).c_str(), stderr);
+  if (a.quiet && run.statistics.dropped_nodes > 0) tell(dropped_line(run));
+  for (const std::string& text : run.warnings) tell(fmt::format("warning: {}\n", text));
+  if (run.collapsed_at) tell(collapse_warning(run));
   if (a.quiet) return;
   const std::chrono::duration<double> took = std::chrono::steady_clock::now() - began;
-  std::fputs(filter_summary(context, run, took.count()).c_str(), stderr);
+  tell(filter_summary(context, run, took.count()));
 }
 
 }  // namespace

@@ -84,18 +84,11 @@ std::string error_line(const FilterRun& run) {
 std::string ratio_lines(const FilterRun& run) {
   const std::optional<LikelihoodRatio>& ratio = run.last.ratio;
   if (!ratio) return {};
-  std::string text = fmt::format(
+  return fmt::format(
       "  against noise alone: log Bayes factor {:.6f}, log variance of the likelihood ratio {:.6g}, {:.4g} "
       "effective "
       "particles\n",
       ratio->log_mean, ratio->log_variance, ratio->effective_size);
-  if (run.collapsed_at)
-    text += fmt::format(
-        "  warning: the weights collapsed at t = {:g}: fewer than 10 effective particles, so that what is "
-        "reported from "
-        "then on rests on a few of them\n",
-        *run.collapsed_at);
-  return text;
 }
 
 std::string work_line(const FilterContext& c, const FilterRun& run, double seconds) {
@@ -159,6 +152,14 @@ Json filter_report(const FilterContext& c, const FilterRun& run) {
 std::string dropped_line(const FilterRun& run) {
   return fmt::format("wienertree: {} of {} nodes could not be moved and were dropped\n",
                      run.statistics.dropped_nodes, run.statistics.children);
+}
+
+std::string collapse_warning(const FilterRun& run) {
+  return fmt::format(
+      "warning: the weights collapsed at t = {:g}: fewer than 10 effective particles, so that what is "
+      "reported from "
+      "then on rests on a few of them\n",
+      *run.collapsed_at);
 }
 
 std::string filter_summary(const FilterContext& context, const FilterRun& run, double seconds) {

@@ -24,6 +24,9 @@ Json filter_report(const FilterContext& context, const FilterRun& run);
 /// "wienertree: 12 of 300 nodes could not be moved and were dropped\n"
 std::string dropped_line(const FilterRun& run);
 
+/// "warning: the weights collapsed at t = 3: ..\n". @pre run.collapsed_at
+std::string collapse_warning(const FilterRun& run);
+
 /// The final posterior as an aligned table, beside the exact one where there is one; log evidence, work,
 /// time.
 std::string filter_summary(const FilterContext& context, const FilterRun& run, double seconds);

@@ -149,7 +149,7 @@ OutputFile::OutputFile(std::string option, const std::string& target)
   if (!fs::is_directory(directory, failure)) refuse("there is no such directory");
   if (::access(directory.c_str(), W_OK | X_OK) != 0)
     refuse("its directory cannot be written: " + reason(errno));
-  noted_.emplace(option_, target_);
+  noted_.emplace(option_, fs::exists(target, failure) ? target : target_);
   remove_abandoned_temporaries(target_);
   // Whatever else may be wrong with the name or the file system is found out now.
   const std::string name = temporary_name();

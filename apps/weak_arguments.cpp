@@ -84,7 +84,6 @@ void refuse_inapplicable(const WeakArguments& a, ThinningMethod thin, bool rando
   refuse_if(a.nodes && thin == ThinningMethod::none, "--nodes", with_thinning);
   refuse_if(a.order && !random, "--order", with_thinning);
   refuse_if(a.recombination_degree && !recombines(thin), "--recombination-degree", with_thinning);
-  refuse_if(a.seed && !random, "--seed", with_thinning + ", which draws nothing");
   refuse_if(a.launches && !random, "--launches", with_thinning + ", which draws nothing");
   refuse_if(a.gamma && a.grid != GridKind::kusuoka, "--gamma", "has meaning only with --grid kusuoka");
   const std::string with_exact_flow = "has no meaning with --flow exact";

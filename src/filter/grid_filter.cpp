@@ -36,7 +36,7 @@ const Model& checked(const Model& model, const FilterOptions& options) {
   if (model.bounds[0].bounded() && model.bounds[0].boundary == Boundary::absorb)
     throw InputError("the grid filter has no absorbing bounds", where, "absorb");
   if (options.grid_points < fewest_points)
-    throw InputError(fmt::format("must be at least {}", fewest_points), "grid points",
+    throw InputError(fmt::format("must be at least {}", fewest_points), "nodes",
                      std::to_string(options.grid_points));
   if (!(options.grid_step > 0))
     throw InputError("must be positive", "grid step", fmt::format("{}", options.grid_step));

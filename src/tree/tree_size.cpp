@@ -20,6 +20,22 @@ std::string_view reason(FailureReason r) {
   return "";
 }
 
+// What the solver's own words mean for the model, and what to try.
+std::string_view advice(FailureReason r) {
+  switch (r) {
+    case FailureReason::not_finite:
+      return "a coefficient is not finite where the path leads; shorter steps (--steps) or bounds of the "
+             "state may help";
+    case FailureReason::tolerance_not_reached:
+      return "the state grows without bound along the path, or a coefficient is not smooth there; shorter "
+             "steps "
+             "(--steps), a looser --rtol or --atol, or bounds of the state may help";
+    case FailureReason::left_bounds:
+      return "shorter steps (--steps) may help, and --on-node-failure drop leaves such nodes out";
+  }
+  return "";
+}
+
 }  // namespace
 
 UnprunedSize unpruned_size(const CubatureFormula& formula, const Model& model, std::size_t steps,
@@ -61,8 +77,10 @@ void throw_node_failure(const std::vector<NodeFailure>& failures, const Model& m
                         const std::string& where) {
   const NodeFailure& f = *std::min_element(failures.begin(), failures.end(),
                                            [](const auto& a, const auto& b) { return a.node < b.node; });
-  throw RunError(fmt::format("{}{}{} ({} node{} failed)", reason(f.reason), f.message.empty() ? "" : ": ",
-                             f.message, failures.size(), failures.size() == 1 ? "" : "s"),
+  const std::string solver =
+      f.message.empty() ? "" : fmt::format(": {}; the solver says: {}", advice(f.reason), f.message);
+  throw RunError(fmt::format("{}{} ({} node{} failed)", reason(f.reason), solver, failures.size(),
+                             failures.size() == 1 ? "" : "s"),
                  fmt::format("{}, node {}, state {}", where, f.node, model.state_names[f.state]),
                  fmt::format("{}", f.value));
 }

@@ -70,6 +70,10 @@ std::vector<std::string> Workplace::files() const {
 }
 
 Running Workplace::start(const std::string& arguments, bool by_pipes) const {
+  return start(split(arguments, ' '), by_pipes);
+}
+
+Running Workplace::start(std::vector<std::string> words, bool by_pipes) const {
   Running running;
   // What is captured lies outside the working directory, whose files tests look at.
   running.captured_ = std::make_unique<Workplace>();
@@ -78,7 +82,6 @@ Running Workplace::start(const std::string& arguments, bool by_pipes) const {
                     err = (captured / "err").string();
   running.captured_->write("in", input);
   std::string program = WIENERTREE_PROGRAM;
-  std::vector<std::string> words = split(arguments, ' ');
   std::vector<char*> argv = {program.data()};
   for (std::string& word : words) argv.push_back(word.data());
   argv.push_back(nullptr);
@@ -130,8 +133,10 @@ Running Workplace::start(const std::string& arguments, bool by_pipes) const {
   return running;
 }
 
-Outcome Workplace::run(const std::string& arguments) const {
-  Running running = start(arguments);
+Outcome Workplace::run(const std::string& arguments) const { return run(split(arguments, ' ')); }
+
+Outcome Workplace::run(const std::vector<std::string>& words) const {
+  Running running = start(words);
   if (kill_after) {
     std::this_thread::sleep_for(*kill_after);
     running.signal(SIGKILL);

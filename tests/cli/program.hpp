@@ -65,8 +65,11 @@ class Workplace {
 
   /// Runs the program with these arguments, split at spaces.
   Outcome run(const std::string& arguments) const;
+  /// The same with arguments that may hold spaces.
+  Outcome run(const std::vector<std::string>& words) const;
   /// Starts it. `by_pipes`: with pipes to its standard input and from its standard output.
   Running start(const std::string& arguments, bool by_pipes = false) const;
+  Running start(std::vector<std::string> words, bool by_pipes = false) const;
 
  private:
   std::filesystem::path directory_;

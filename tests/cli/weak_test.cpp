@@ -276,7 +276,7 @@ TEST_CASE("weak: what is wrong is one line and exit code 2") {
       {"weak heston --horizon 1 --steps 12 --payoff s --thin none", "--thin recombination"},
       {gbm + "--payoff s --nodes 900000000", "--nodes"},
       {gbm + "--payoff s --tolerance 1e-3", "--steps"},
-      {gbm + "--payoff s --thin levelwise --seed 3", "draws nothing"},
+      {gbm + "--payoff s --thin levelwise --launches 3", "draws nothing"},
       {gbm + "--payoff s --thin heavy-first --order tree", "--order"},
       {"weak gbm --horizon 1 --payoff s --tolerance 1e-3 --launches 4", "draws nothing"},
       {"weak gbm --horizon 1 --payoff s --tolerance 1e-3 --thin tbba --launches 1", "2 or more"},
