@@ -107,10 +107,11 @@ Json identity_of(const WeakArguments& a, const WeakProblem& problem) {
   return run;
 }
 
-void tell(const WeakArguments& a, const WeakProblem& problem, const WeakOutcome& outcome, double seconds) {
+void summarise(const WeakArguments& a, const WeakProblem& problem, const WeakOutcome& outcome,
+               double seconds) {
   const std::string work = fmt::format("\n  {} nodes at the end, {} ODE solves, {:.3g} s\n", outcome.leaves,
                                        outcome.ode_solves, seconds);
-  std::fputs((summary_of(a, problem, outcome) + work).c_str(), stderr);
+  tell(summary_of(a, problem, outcome) + work);
 }
 
 void approximate_and_write(const WeakCommandArguments& a) {
@@ -156,9 +157,9 @@ void approximate_and_write(const WeakCommandArguments& a) {
                    ? to_csv(table)
                    : to_json(report_of(a.weak, problem, outcome.run), table));
   output.publish();
-  if (!a.quiet) tell(a.weak, problem, outcome, took);
+  if (!a.quiet) summarise(a.weak, problem, outcome, took);
   if (outcome.warning.empty()) return;
-  app::tell(fmt::format("warning: tolerance {:g}: {}\n", *a.weak.tolerance, outcome.warning));
+  tell(fmt::format("warning: tolerance {:g}: {}\n", *a.weak.tolerance, outcome.warning));
   throw SaidAlready{1};
 }
 
