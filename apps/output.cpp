@@ -15,9 +15,9 @@
 #include <filesystem>
 #include <system_error>
 
-#include "checksum.hpp"
 #include "wienertree/model/text/printable.hpp"
 #include "wienertree/numeric/error.hpp"
+#include "wienertree/run/checksum.hpp"
 
 namespace wienertree::app {
 namespace {

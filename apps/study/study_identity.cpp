@@ -3,7 +3,7 @@
 #include <fstream>
 #include <sstream>
 
-#include "../checksum.hpp"
+#include "wienertree/run/checksum.hpp"
 #include "../data_directory.hpp"
 #include "wienertree/cubature/formula_file.hpp"
 #include "wienertree/version.hpp"
