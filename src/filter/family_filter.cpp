@@ -93,10 +93,11 @@ bool FamilyFilter::observes(const ObservationWindow& window) const {
 
 void FamilyFilter::advance(const ObservationWindow& window) {
   const bool observed = observes(window), first = window.at_start || !(window.length() > 0);
+  clock_ = window.start;  // t is the time of the observations
   if (observed && first) take_in(window);
   if (window.length() > 0) {
     move(window);
-    clock_ += window.length();
+    clock_ = window.end;
     if (observed && !first) take_in(window);
   }
   ++statistics_.steps;

@@ -89,7 +89,7 @@ std::vector<double> linear_errors(int p, const Driven& driven) {
     for (std::size_t j = 1; j < A.size(); ++j) generator += 0.5 * A[j] * A[j];
     const Eigen::Vector3d exact = generator.exp() * Eigen::Vector3d(1, 0.5, 0);
     const TextModel text = TextModel::parse(linear_model(A), "linear");
-    std::vector<BatchFunction> means;
+    std::vector<WeakPayoff> means;
     for (int i = 0; i < size; ++i) means.push_back(text.compile(fmt::format("x{}", i), "payoff"));
     WeakRun run;
     const Model model = driven(text, run.options.formula);
