@@ -83,7 +83,8 @@ TEST_CASE("Heston's model is recognised however it is written") {
     INFO(diffusion);
     const TextModel model = model_of(heston_states, drift, diffusion);
     REQUIRE(model.square_roots());
-    const auto& [components, integrals, price] = *model.square_roots();
+    const auto& components = model.square_roots()->components;
+    const auto& price = model.square_roots()->price;
     REQUIRE(components.size() == 1);
     CHECK(components[0].state == 1);
     CHECK(components[0].process.a == Approx(0.075).epsilon(1e-14));
