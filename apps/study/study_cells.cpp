@@ -166,7 +166,8 @@ FilterCell parse_filter_cell(const CellOptions& options, ModelShelf& models, con
     // A study measures approximations: it has the exact filter for its truth.
     if (!arguments.method) arguments.method = FilterMethod::klv;
     // It varies the steps of one tree.
-    if (!arguments.conditioning) arguments.conditioning = Conditioning::children;
+    if (arguments.method == FilterMethod::klv && !arguments.conditioning)
+      arguments.conditioning = Conditioning::children;
     cell.setup = filter_setup(arguments, *cell.model);
     cell.setup.options.threads = static_cast<unsigned>(arguments.threads.value_or(1));
     cell.steps = steps;

@@ -180,7 +180,7 @@ TEST_CASE("grid filter: what it cannot do is refused, saying why") {
   at_bound.initial_law = InitialLaw{Eigen::VectorXd::Constant(1, 1.0), Eigen::MatrixXd::Constant(1, 1, 1.0)};
   refuses(at_bound, o, "bound");
   o.grid_points = 10;
-  refuses(scalar("-x", "1", ""), o, "grid points");
+  refuses(scalar("-x", "1", ""), o, "nodes");
   o = {};
   o.grid_step = 0;
   refuses(scalar("-x", "1", ""), o, "grid step");
