@@ -71,7 +71,7 @@ TEST_CASE("the summary for people goes to standard error, and --quiet keeps it b
   cli::simulate_benes(place);
   const Outcome told = place.run("filter benes --method klv --observations Y.csv --output out.csv");
   CHECK(told.out.empty());
-  for (const char* part : {"KLV filter", "benes", "401 rows", "200 steps", "functional second-order",
+  for (const char* part : {"KLV filter", "benes", "401 rows", "400 steps", "functional second-order",
                            "posterior at t = 4", "mean", "exact", "difference", "log evidence", "ODE solves"})
     CHECK_THAT(told.err, Catch::Contains(part));
   CHECK(Columns(place.read("out.csv")).rows() == 201);

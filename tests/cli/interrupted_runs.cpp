@@ -28,7 +28,7 @@ struct Kind {
 
 std::vector<Kind> kinds() {
   std::vector<Kind> all;
-  const std::string continuous = "filter benes --method klv --observations Y.csv --steps 400 ",
+  const std::string continuous = "filter benes --observations Y.csv --steps 400 ",
                     discrete = "filter noisy.toml --observations Z.csv ";
   for (const char* options :
        {"--nodes 60", "--thin tbba --nodes 300", "--thin multinomial --nodes 300 --ess-threshold 0.5",

@@ -130,7 +130,7 @@ def test_one_posterior_a_step(record):
 
 
 def test_the_law_at_a_step(record):
-    run = wt.Filter("benes", record, steps=50)
+    run = wt.Filter("benes", record, method="klv", steps=50)
     for _ in range(20):
         posterior = next(run)
     x, w = posterior.points, posterior.weights

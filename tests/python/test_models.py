@@ -82,9 +82,12 @@ def test_mistakes_name_line_column_key_and_value():
         wt.Model(OU_DICT | {"state": {"x": {1, 2}}})
 
 
-def test_strings_of_a_dict_survive_any_character():
-    odd = 'a "quoted" \\ name\twith \x7f and \u00e9\U0001d6fc'
+def test_strings_of_a_dict_survive_any_printable_character():
+    odd = 'a "quoted" \\ name with \u00e9\U0001d6fc'
     assert wt.Model(OU_DICT | {"name": odd}).name == odd
+    for control in "\t\n\x1b\x7f":
+        with pytest.raises(wt.InputError):
+            wt.Model(OU_DICT | {"name": "a" + control})
 
 
 def test_simulation_is_a_function_of_its_seed():
