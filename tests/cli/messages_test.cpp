@@ -71,7 +71,8 @@ TEST_CASE("a collapse of the weights is told with --quiet too") {
     for (const std::string& line : lines_of(outcome.err))
       warnings += line.starts_with("warning: the weights collapsed at t = ") ? 1 : 0;
     CHECK(warnings == 1);
-    if (!quiet.empty()) CHECK(lines_of(outcome.err).size() == 1);
+    // The other one is the accuracy control's: the tolerance is not reached.
+    if (!quiet.empty()) CHECK(lines_of(outcome.err).size() == 2);
   }
 }
 
