@@ -215,8 +215,7 @@ void compare_and_write(const CompareArguments& a) {
   for (std::size_t m = 0; m < all.size(); ++m)
     for (const std::string& text : comparison.warnings[m])
       tell(fmt::format("warning: {}: {}\n", all[m].label, text));
-  for (const std::string& text : undecided(all, comparison))
-    tell(fmt::format("warning: {}\n", text));
+  for (const std::string& text : undecided(all, comparison)) tell(fmt::format("warning: {}\n", text));
   if (!a.quiet) tell(summary_of(a, all, comparison));
 }
 

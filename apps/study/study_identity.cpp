@@ -3,9 +3,9 @@
 #include <fstream>
 #include <sstream>
 
-#include "wienertree/run/checksum.hpp"
 #include "../data_directory.hpp"
 #include "wienertree/cubature/formula_file.hpp"
+#include "wienertree/run/checksum.hpp"
 #include "wienertree/version.hpp"
 
 namespace wienertree::app {

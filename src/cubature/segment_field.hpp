@@ -5,8 +5,8 @@
 #include <vector>
 
 #include "wienertree/cubature/flow.hpp"
-#include "wienertree/numeric/batch.hpp"
 #include "wienertree/model/model.hpp"
+#include "wienertree/numeric/batch.hpp"
 
 namespace wienertree {
 

@@ -4,8 +4,8 @@
 #include <vector>
 
 #include "wienertree/cubature/gaussian_cubature.hpp"
-#include "wienertree/numeric/batch.hpp"
 #include "wienertree/model/model.hpp"
+#include "wienertree/numeric/batch.hpp"
 
 namespace wienertree {
 

@@ -10,8 +10,8 @@
 #include <utility>
 #include <vector>
 
-#include "wienertree/numeric/error.hpp"
 #include "wienertree/model/vector_fields.hpp"
+#include "wienertree/numeric/error.hpp"
 
 namespace wienertree {
 

@@ -114,7 +114,7 @@ ControlledFilter::Plan ControlledFilter::plan(RunRole role, int level) const {
   if (free && level == 0 && (doubles_nodes || control_.steps)) nodes = std::max<std::size_t>(1, nodes / 2);
   if (doubles_nodes && level > 1) nodes <<= level - 1;
   // A grid that was asked for is taken, or refused, as it is; halves of it have cells enough for a posterior.
-  if (grid && nodes < setup_.options.grid_points) nodes = std::max<std::size_t>(nodes, 64);
+  if (grid) nodes = std::max(nodes, std::min<std::size_t>(setup_.options.grid_points, 64));
   if (role == RunRole::nodes) nodes = std::max<std::size_t>(1, nodes / 2);
   if (free) o.substep_tolerance = std::ldexp(o.substep_tolerance, 1 - level);
   if (grid) o.grid_step = std::ldexp(o.grid_step, 1 - level);

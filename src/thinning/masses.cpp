@@ -11,8 +11,8 @@
 #include <cstring>
 #include <limits>
 
-#include "wienertree/numeric/error.hpp"
 #include "wienertree/numeric/clones.hpp"
+#include "wienertree/numeric/error.hpp"
 #include "wienertree/numeric/log_weights.hpp"
 
 namespace wienertree {

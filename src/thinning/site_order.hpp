@@ -9,8 +9,8 @@
 #include <vector>
 
 #include "wienertree/numeric/hilbert.hpp"
-#include "wienertree/thinning/masses.hpp"
 #include "wienertree/numeric/prefix_sort.hpp"
+#include "wienertree/thinning/masses.hpp"
 #include "wienertree/thinning/thinning.hpp"
 
 namespace wienertree {

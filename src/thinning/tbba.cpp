@@ -8,8 +8,8 @@
 #include <cassert>
 #include <vector>
 
-#include "wienertree/numeric/error.hpp"
 #include "wienertree/numeric/clones.hpp"
+#include "wienertree/numeric/error.hpp"
 #include "wienertree/thinning/masses.hpp"
 
 namespace wienertree {

@@ -7,9 +7,9 @@
 
 #include "wienertree/cubature/flow.hpp"
 #include "wienertree/cubature/formula.hpp"
-#include "wienertree/tree/generation.hpp"
 #include "wienertree/numeric/parallel.hpp"
 #include "wienertree/thinning/thinning.hpp"
+#include "wienertree/tree/generation.hpp"
 
 namespace wienertree {
 

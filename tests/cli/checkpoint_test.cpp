@@ -95,7 +95,8 @@ TEST_CASE("checkpoints of compare and weak: finished ones give the same bytes, o
   check_refused(place, compare + "--resume save --seed 3 --thin tbba", "models 0 options");
   check_refused(place, filter + "--resume save", "command was \"compare\", and is \"filter\"");
 
-  const std::string weak = "weak heston --horizon 1 --payoff max(s-1,0) --square-roots off --nodes 200 --quiet ";
+  const std::string weak =
+      "weak heston --horizon 1 --payoff max(s-1,0) --square-roots off --nodes 200 --quiet ";
   for (const std::string options : {"--steps 6 ", "--steps 6 --richardson ", "--tolerance 1e-3 "}) {
     const auto values = [&](const std::string& more) {
       const std::string table = output_of(place, weak + options + more);

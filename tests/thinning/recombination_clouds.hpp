@@ -9,8 +9,8 @@
 #include <string>
 #include <vector>
 
-#include "wienertree/thinning/recombination/recombination.hpp"
 #include "wienertree/thinning/recombination/polynomials.hpp"
+#include "wienertree/thinning/recombination/recombination.hpp"
 
 namespace wienertree::recombination_test {
 

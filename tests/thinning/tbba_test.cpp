@@ -5,8 +5,8 @@
 #include <cmath>
 #include <numeric>
 
-#include "thinning/exact_tbba.hpp"
 #include "numeric/statistics.hpp"
+#include "thinning/exact_tbba.hpp"
 #include "wienertree/numeric/error.hpp"
 #include "wienertree/thinning/masses.hpp"
 

@@ -12,9 +12,9 @@
 #include <sstream>
 
 #include "wienertree/numeric/error.hpp"
+#include "wienertree/thinning/thinning.hpp"
 #include "wienertree/tree/genealogy_graph.hpp"
 #include "wienertree/tree/growth.hpp"
-#include "wienertree/thinning/thinning.hpp"
 
 using namespace wienertree;
 

@@ -5,8 +5,8 @@
 #include <numbers>
 #include <unordered_map>
 
-#include "wienertree/numeric/error.hpp"
 #include "wienertree/model/text/expression.hpp"
+#include "wienertree/numeric/error.hpp"
 
 namespace wienertree::text {
 

@@ -30,10 +30,11 @@ ex SymbolicBudget::derivative(const ex& e, const GiNaC::realsymbol& x, const Sou
   const SymbolicSize size = symbolic_size(e, x);
   const auto fail = [&](const std::string& message) { throw InputError(message, place.location.text()); };
   if (size.derivative > largest_derivative)
-    fail(fmt::format("the derivative by {} of an expression of {:.3g} terms and operations (this one, or its "
-                     "Ito-Stratonovich correction) has up to {:.3g}, over the limit of {:g}: shorten it, its "
-                     "products above all",
-                     x.get_name(), size.expression, size.derivative, largest_derivative));
+    fail(
+        fmt::format("the derivative by {} of an expression of {:.3g} terms and operations (this one, or its "
+                    "Ito-Stratonovich correction) has up to {:.3g}, over the limit of {:g}: shorten it, its "
+                    "products above all",
+                    x.get_name(), size.expression, size.derivative, largest_derivative));
   spent_ += 1 + size.derivative;
   if (spent_ > largest_derivatives)
     fail(fmt::format(

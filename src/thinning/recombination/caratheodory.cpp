@@ -5,8 +5,8 @@
 #include <cmath>
 #include <numeric>
 
-#include "wienertree/numeric/error.hpp"
 #include "wienertree/numeric/clones.hpp"
+#include "wienertree/numeric/error.hpp"
 #include "wienertree/thinning/recombination/vectors.hpp"
 
 namespace wienertree::recombination {

@@ -8,8 +8,8 @@
 #include <limits>
 #include <numeric>
 
-#include "wienertree/numeric/error.hpp"
 #include "wienertree/numeric/clones.hpp"
+#include "wienertree/numeric/error.hpp"
 #include "wienertree/thinning/recombination/vectors.hpp"
 
 namespace wienertree::recombination {
