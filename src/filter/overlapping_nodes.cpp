@@ -8,7 +8,7 @@ namespace wienertree {
 namespace {
 
 constexpr std::size_t nodes_a_patch = 6, most_nodes = 512;
-constexpr double widest = 6;    // of a patch in xi
+constexpr double widest = 4;    // of a patch in xi
 constexpr double tail = 1e-40;  // of the mass: 13 standard deviations of a Gaussian
 
 }  // namespace
