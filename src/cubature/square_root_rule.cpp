@@ -35,35 +35,72 @@ Eigen::MatrixXd exponential(Eigen::MatrixXd A) {
   return sum;
 }
 
-// Eigenvalues of the symmetric tridiagonal matrix with this diagonal and these squares beside it: the nodes
-// (Golub, Welsch 1969). Weights are 1/sum_k p_k^2 with orthonormal polynomials p_k, which keeps the relative
-// accuracy of small ones.
-void gauss_rule(const std::array<long double, 4>& alpha, const std::array<long double, 4>& beta,
-                std::size_t q, std::array<double, 4>& node, std::array<double, 4>& weight) {
+using Four = std::array<double, 4>;
+using LongNine = std::array<long double, 9>;
+
+// Of a law of mean 0 and variance 1: nodes z_m, weights, and the orthonormal polynomials e_i, i < q, at the
+// nodes and by coefficients.
+struct GaussRule {
+  Four node{}, weight{};
+  std::array<Four, 4> value{}, coefficient{};  // e_i(z_m); of z^r in e_i
+};
+
+// Eigenvalues of the symmetric tridiagonal matrix with the diagonal alpha and the roots of beta beside it: the
+// nodes (Golub, Welsch 1969). Weights are 1/sum_i e_i^2, which keeps the relative accuracy of small ones.
+GaussRule gauss_rule(const std::array<long double, 4>& alpha, const std::array<long double, 4>& beta,
+                     std::size_t q) {
   using Vector = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, 4, 1>;
   using Matrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, 4, 4>;
   const auto size = static_cast<Eigen::Index>(q);
   Vector diagonal(size), beside(size - 1);
-  for (std::size_t k = 0; k < q; ++k) diagonal(static_cast<Eigen::Index>(k)) = static_cast<double>(alpha[k]);
-  for (std::size_t k = 1; k < q; ++k)
-    beside(static_cast<Eigen::Index>(k) - 1) = std::sqrt(static_cast<double>(beta[k]));
+  Four a{}, b{};
+  for (std::size_t k = 0; k < q; ++k) {
+    diagonal(static_cast<Eigen::Index>(k)) = a[k] = static_cast<double>(alpha[k]);
+    b[k] = std::sqrt(static_cast<double>(beta[k]));
+    if (k > 0) beside(static_cast<Eigen::Index>(k) - 1) = b[k];
+  }
   Eigen::SelfAdjointEigenSolver<Matrix> solver(size);
   solver.computeFromTridiagonal(diagonal, beside, Eigen::EigenvaluesOnly);
+  GaussRule rule;
+  // e_{i+1} = ((z - a_i) e_i - b_i e_{i-1}) / b_{i+1}
+  rule.coefficient[0][0] = 1;
+  for (std::size_t i = 0; i + 1 < q; ++i)
+    for (std::size_t r = 0; r <= i + 1; ++r)
+      rule.coefficient[i + 1][r] = ((r > 0 ? rule.coefficient[i][r - 1] : 0) - a[i] * rule.coefficient[i][r] -
+                                    (i > 0 ? b[i] * rule.coefficient[i - 1][r] : 0)) /
+                                   b[i + 1];
   double total = 0;
   for (std::size_t m = 0; m < q; ++m) {
-    node[m] = solver.eigenvalues()(static_cast<Eigen::Index>(m));
-    double before = 0, p = 1, sum = 1, beside_before = 0;
-    for (Eigen::Index k = 0; k + 1 < size; ++k) {
-      const double next = ((node[m] - diagonal(k)) * p - beside_before * before) / beside(k);
-      beside_before = beside(k);
-      before = p;
-      p = next;
-      sum += p * p;
+    const double z = rule.node[m] = solver.eigenvalues()(static_cast<Eigen::Index>(m));
+    double squares = rule.value[0][m] = 1;
+    for (std::size_t i = 0; i + 1 < q; ++i) {
+      const double e = ((z - a[i]) * rule.value[i][m] - (i > 0 ? b[i] * rule.value[i - 1][m] : 0)) / b[i + 1];
+      rule.value[i + 1][m] = e;
+      squares += e * e;
     }
-    weight[m] = 1 / sum;
-    total += weight[m];
+    rule.weight[m] = 1 / squares;
+    total += rule.weight[m];
   }
-  for (std::size_t m = 0; m < q; ++m) weight[m] /= total;
+  for (std::size_t m = 0; m < q; ++m) rule.weight[m] /= total;
+  return rule;
+}
+
+// The rule of the law with the moments m_0 .. m_{2q-1}: Chebyshev's algorithm.
+GaussRule rule_of_moments(const LongNine& m, std::size_t q) {
+  std::array<long double, 4> alpha{}, beta{};
+  LongNine current = m, previous{};
+  beta[0] = 1;
+  alpha[0] = m[1];
+  for (std::size_t k = 1; k < q; ++k) {
+    LongNine next{};
+    for (std::size_t j = k; j < 2 * q - k; ++j)
+      next[j] = current[j + 1] - alpha[k - 1] * current[j] - (k > 1 ? beta[k - 1] * previous[j] : 0);
+    beta[k] = next[k] / current[k - 1];
+    alpha[k] = next[k + 1] / next[k] - current[k] / current[k - 1];
+    previous = current;
+    current = next;
+  }
+  return gauss_rule(alpha, beta, q);
 }
 
 }  // namespace
@@ -82,10 +119,11 @@ SquareRootRule::SquareRootRule(const SquareRootProcess& process, double s, std::
   g_ = c * psi / 4;
   delta_ = 4 * a / c;
 
-  // The generator (a + b v) d/dv + c v/2 d^2/dv^2 + v d/dJ on monomials v^i J^j of total degree at most 3.
+  // The generator (a + b v) d/dv + c v/2 d^2/dv^2 + v d/dJ on monomials v^i J^j of total degree at most q + 1.
+  const int degree = static_cast<int>(q) + 1;
   std::vector<Monomial> monomials;
-  for (int j = 0; j <= 3; ++j)
-    for (int i = 0; i + j <= 3; ++i) monomials.push_back({i, j});
+  for (int j = 0; j <= degree; ++j)
+    for (int i = 0; i + j <= degree; ++i) monomials.push_back({i, j});
   const auto place = [&](int i, int j) {
     return std::find(monomials.begin(), monomials.end(), Monomial{i, j}) - monomials.begin();
   };
@@ -98,10 +136,11 @@ SquareRootRule::SquareRootRule(const SquareRootProcess& process, double s, std::
     if (j >= 1) G(row, place(i + 1, j - 1)) += j;
   }
   const Eigen::MatrixXd E = exponential(G * s);
-  constexpr std::array<Monomial, 4> wanted{{{0, 1}, {1, 1}, {2, 1}, {0, 2}}};
-  for (std::size_t k = 0; k < wanted.size(); ++k)
-    for (int i = 0; i <= 3; ++i)
-      moments_[k][static_cast<std::size_t>(i)] = E(place(wanted[k].i, wanted[k].j), place(i, 0));
+  for (std::size_t j = 0; j < 2; ++j)
+    for (std::size_t i = 0; i < q; ++i)
+      for (int k = 0; k <= degree; ++k)
+        moments_[j][i][static_cast<std::size_t>(k)] =
+            E(place(static_cast<int>(i), static_cast<int>(j) + 1), place(k, 0));
 }
 
 double SquareRootRule::deviation(double x) const {
@@ -114,9 +153,9 @@ SquareRootRule::Children SquareRootRule::children(double x) const {
   if (!(sd > 1e-150)) {  // nothing moves: a = 0 and x = 0
     result.v.fill(expected);
     result.weight.fill(1.0 / static_cast<double>(q_));
-    const double I = moments_[0][0] + moments_[0][1] * x;
+    const double I = moments_[0][0][0] + moments_[0][0][1] * x;
     result.integral.fill({I, I});
-    result.share.fill(0.5);
+    result.share.fill({0.5, 0.5});
     return result;
   }
   // Standardised cumulants: kappa_j / sd^j with h = sd/g, kappa_j = 2^{j-1} (j-1)! (delta + j l) g^j. All are
@@ -140,74 +179,70 @@ SquareRootRule::Children SquareRootRule::children(double x) const {
       binomial = binomial * static_cast<long double>(k - j) / static_cast<long double>(j);
     }
   }
-  std::array<long double, 4> alpha{}, beta{};
-  std::array<long double, 9> current = m, previous{};
-  beta[0] = 1;
-  for (std::size_t k = 1; k < q_; ++k) {
-    std::array<long double, 9> next{};
-    for (std::size_t j = k; j < n - k; ++j)
-      next[j] = current[j + 1] - alpha[k - 1] * current[j] - (k > 1 ? beta[k - 1] * previous[j] : 0);
-    beta[k] = next[k] / current[k - 1];
-    alpha[k] = next[k + 1] / next[k] - current[k] / current[k - 1];
-    previous = current;
-    current = next;
+  const GaussRule rule = rule_of_moments(m, q_);
+  result.weight = rule.weight;
+  for (std::size_t k = 0; k < q_; ++k) result.v[k] = std::max(0.0, expected + sd * rule.node[k]);
+  // E[I^j v^i] at x, then E[I^j z^i], z = (v - mean)/sd.
+  std::array<Four, 2> mixed{};
+  for (std::size_t j = 0; j < 2; ++j) {
+    Four raw{};
+    for (std::size_t i = 0; i < q_; ++i)
+      for (std::size_t k = q_ + 2; k-- > 0;) raw[i] = raw[i] * x + moments_[j][i][k];
+    double scale = 1;
+    for (std::size_t i = 0; i < q_; ++i, scale *= sd) {
+      double binomial = 1;  // of i over k
+      for (std::size_t k = 0; k <= i; ++k) {
+        mixed[j][i] += binomial * std::pow(-expected, static_cast<double>(i - k)) * raw[k];
+        binomial *= static_cast<double>(i - k) / static_cast<double>(k + 1);
+      }
+      mixed[j][i] /= scale;
+    }
   }
-  gauss_rule(alpha, beta, q_, result.v, result.weight);
-  for (std::size_t k = 0; k < q_; ++k) result.v[k] = std::max(0.0, expected + sd * result.v[k]);
-  add_integral(x, result);
+  // Where sd is small against the mean, rounding would blur the higher coefficients, which are then negligible:
+  // that of e_i in E[I|v] falls as (sd/mean)^i, in Var[I|v] as (sd/mean)^{2+i}, in units of E I and its square.
+  const bool narrow = sd < narrow_law * expected;
+  std::array<Four, 2> given{};  // E[I^j | v] at the nodes
+  const auto project = [&](std::size_t j, std::size_t terms) {
+    for (std::size_t i = 0; i < terms; ++i) {
+      double coefficient = 0;
+      for (std::size_t r = 0; r <= i; ++r) coefficient += rule.coefficient[i][r] * mixed[j][r];
+      for (std::size_t k = 0; k < q_; ++k) given[j][k] += coefficient * rule.value[i][k];
+    }
+  };
+  project(0, narrow ? std::min<std::size_t>(q_, 3) : q_);
+  if (!narrow) project(1, q_);
+  add_integral(mixed[0][0], mixed[1][0], narrow, given, result);
   return result;
 }
 
-void SquareRootRule::add_integral(double x, Children& children) const {
-  std::array<double, 4> moment;
-  for (std::size_t k = 0; k < 4; ++k)
-    moment[k] = moments_[k][0] + x * (moments_[k][1] + x * (moments_[k][2] + x * moments_[k][3]));
-  const auto [I, Iv, Ivv, II] = moment;
-  const double m = mean(x), sd = deviation(x);
-  std::array<double, most_nodes> z{};
-  double M3 = 0, M4 = 0;
-  for (std::size_t k = 0; k < q_; ++k) {
-    z[k] = (children.v[k] - m) / sd;
-    M3 += children.weight[k] * z[k] * z[k] * z[k];
-    M4 += children.weight[k] * z[k] * z[k] * z[k] * z[k];
+void SquareRootRule::add_integral(double I, double II, bool narrow, const std::array<Four, 2>& given,
+                                  Children& children) const {
+  Four mu = given[0];
+  const double least = *std::min_element(mu.begin(), mu.begin() + static_cast<std::ptrdiff_t>(q_));
+  if (least < 0 && nonnegative_) {
+    double sum = 0;
+    for (std::size_t k = 0; k < q_; ++k) sum += children.weight[k] * (mu[k] = std::max(0.0, mu[k]));
+    for (std::size_t k = 0; k < q_; ++k) mu[k] *= I / sum;
   }
-  // e_1 = z, e_2 = (z^2 - 1 - M3 z)/|..|, |..|^2 = M4 - 1 - M3^2
-  const double square = std::max(M4 - 1 - M3 * M3, 1e-12);
-  const double b1 = (Iv - m * I) / sd;
-  const double b2 = ((Ivv - 2 * m * Iv + m * m * I) / (sd * sd) - I - M3 * b1) / square;
-  std::array<double, most_nodes> mu{}, trapezoid{};
-  double sum = 0, least = 0;
+  // The variances at the nodes, scaled to sum up to that of I not explained by v.
+  Four variance{};
+  double left = II, sum = 0;
   for (std::size_t k = 0; k < q_; ++k) {
-    mu[k] = I + b1 * z[k] + (q_ > 2 ? b2 * (z[k] * z[k] - 1 - M3 * z[k]) : 0);
-    trapezoid[k] = x + children.v[k];
-    sum += children.weight[k] * trapezoid[k];
-  }
-  const double r = std::sqrt(std::max(0.0, II - I * I - b1 * b1 - (q_ > 2 ? b2 * b2 * square : 0)));
-  for (std::size_t k = 0; k < q_; ++k) {
-    children.integral[k] = {mu[k] - r, mu[k] + r};
-    least = std::min(least, mu[k] - r);
-  }
-  children.share = {0.5, 0.5};
-  if (nonnegative_ && least < 0) keep_nonnegative(I, II, sum, mu, trapezoid, children);
-}
-
-void SquareRootRule::keep_nonnegative(double I, double II, double sum, std::array<double, most_nodes> mu,
-                                      std::array<double, most_nodes> trapezoid, Children& children) const {
-  // (1 - part) mu + part trapezoid >= 0
-  double part = 0, squares = 0;
-  for (std::size_t k = 0; k < q_; ++k) {
-    trapezoid[k] *= I / sum;
-    if (mu[k] < 0) part = std::max(part, mu[k] / (mu[k] - trapezoid[k]));
+    variance[k] = narrow ? 1 : std::max(0.0, given[1][k] - mu[k] * mu[k]);
+    left -= children.weight[k] * mu[k] * mu[k];
+    sum += children.weight[k] * variance[k];
   }
   for (std::size_t k = 0; k < q_; ++k) {
-    mu[k] = std::max(0.0, mu[k] + part * (trapezoid[k] - mu[k]));
-    squares += children.weight[k] * mu[k] * mu[k];
+    const double r = sum > 0 ? std::sqrt(variance[k] * std::max(0.0, left) / sum) : 0;
+    if (!(mu[k] > 0)) {
+      children.integral[k] = nonnegative_ ? std::array{0.0, 0.0} : std::array{mu[k] - r, mu[k] + r};
+      children.share[k] = {0.5, 0.5};
+      continue;
+    }
+    const double rho = r / mu[k], t = 1 / (std::sqrt(1 + rho * rho) + rho);
+    children.integral[k] = {mu[k] * (1 - rho * t), mu[k] * (1 + rho / t)};
+    children.share[k] = {1 / (1 + t * t), t * t / (1 + t * t)};
   }
-  // F = 1 - rho t or 1 + rho/t with probabilities 1/(1 + t^2) and t^2/(1 + t^2): mean 1, variance rho^2.
-  const double rho = squares > 0 ? std::sqrt(std::max(0.0, II / squares - 1)) : 0, t = rho > 1 ? 1 / rho : 1;
-  children.share = {1 / (1 + t * t), t * t / (1 + t * t)};
-  for (std::size_t k = 0; k < q_; ++k)
-    children.integral[k] = {mu[k] * std::max(0.0, 1 - rho * t), mu[k] * (1 + rho / t)};
 }
 
 }  // namespace wienertree

@@ -9,15 +9,19 @@
 /// Gautschi 2004, Orthogonal Polynomials, section 2.1.7), for every x >= 0 and every delta: nodes in [0, inf),
 /// positive weights, no threshold, no bound to clamp at, whether or not 2a >= c (Feller's condition).
 ///
-/// The integral I of v over the step given both ends is
+/// The integral I of v over the step is drawn along with v_s = v. Its first two moments given v are projected on
+/// the orthonormal polynomials e_0 .. e_{q-1} of the law of v_s,
 ///
-///     I = mu(v_s) +- r,     mu = E I + b_1 e_1(v_s) + b_2 e_2(v_s),
+///     mu(v) = sum_i E[I e_i] e_i(v),   S(v) = sum_i E[I^2 e_i] e_i(v),
 ///
-/// e_1, e_2 orthonormal polynomials of degrees 1 and 2 and both signs equally likely, where b_1, b_2 and r make
-/// E[I v_s], E[I v_s^2] and E I^2 exact (these are polynomials of x: the generator maps polynomials of (v, I) to such
-/// of the same degree). Weak order q - 1. Near 0 that may be negative, which a variance must not be. Where it is to
-/// be kept from that, mu is moved towards the trapezoid between both ends, scaled to the exact E I, as far as it
-/// takes; and I = mu F with an independent factor F >= 0 of two values and mean 1, such that E I^2 is exact.
+/// so that all E[I v^i] and E[I^2 v^i], i < q, are exact (these are polynomials of x: the generator maps
+/// polynomials of (v, I) to such of the same degree). At each node I takes two values of mean mu, variance
+/// r^2 = S - mu^2 and the skewness 2 rho, rho = r/mu, of a gamma law, which are positive:
+///
+///     I = mu (1 - rho t) or mu (1 + rho/t)  with probabilities  1/(1 + t^2), t^2/(1 + t^2),   t = sqrt(1 + rho^2) - rho.
+///
+/// Where a projection is negative it is set to 0, and the others are scaled so that E I and E I^2 stay exact.
+/// Weak order q - 1.
 #include <array>
 #include <cstddef>
 
@@ -37,7 +41,7 @@ class SquareRootRule {
   struct Children {
     std::array<double, most_nodes> v, weight;                ///< q each, v ascending; weights sum to 1
     std::array<std::array<double, 2>, most_nodes> integral;  ///< the two values of I at each node
-    std::array<double, 2> share;                             ///< their probabilities
+    std::array<std::array<double, 2>, most_nodes> share;     ///< their probabilities
   };
   /// @pre x >= 0
   Children children(double x) const;
@@ -47,16 +51,18 @@ class SquareRootRule {
   double deviation(double x) const;
 
  private:
-  void add_integral(double x, Children& children) const;
-  void keep_nonnegative(double I, double II, double sum, std::array<double, most_nodes> mu,
-                        std::array<double, most_nodes> trapezoid, Children& children) const;
+  /// sd/mean of v_s below which the variance of I is taken to be the same at all nodes.
+  static constexpr double narrow_law = 0.02;
+  /// @param given E[I | v], E[I^2 | v] at the nodes
+  void add_integral(double I, double II, bool narrow,
+                    const std::array<std::array<double, most_nodes>, 2>& given, Children& children) const;
 
   std::size_t q_;
   bool nonnegative_;
   double growth_, mean_of_zero_;
   double g_, delta_;
-  /// Coefficients of 1, x, x^2, x^3 in E I, E[I v_s], E[I v_s^2], E I^2.
-  std::array<std::array<double, 4>, 4> moments_{};
+  /// [j-1][i][k]: the coefficient of x^k in E[I^j v_s^i].
+  std::array<std::array<std::array<double, most_nodes + 2>, most_nodes>, 2> moments_{};
 };
 
 }  // namespace wienertree

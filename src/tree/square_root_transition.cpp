@@ -27,7 +27,7 @@ Fan fan_of(const SquareRootRule& rule, double w, bool integrated) {
     for (std::size_t f = 0; f < (integrated ? 2U : 1U); ++f) {
       fan.v[fan.size] = children.v[k];
       fan.integral[fan.size] = children.integral[k][f];
-      fan.log_weight[fan.size] = std::log(children.weight[k] * (integrated ? children.share[f] : 1.0));
+      fan.log_weight[fan.size] = std::log(children.weight[k] * (integrated ? children.share[k][f] : 1.0));
       ++fan.size;
     }
   return fan;
