@@ -105,6 +105,9 @@ void choose_treatments(const WeakArguments& a, WeakProblem& problem) {
   refuse_if(a.kink_width && a.kinks && *a.kinks != KinkTreatment::kernel, "--kink-width",
             "has meaning only with --kinks kernel");
   const bool scales_wanted = asked == KinkTreatment::automatic || asked == KinkTreatment::kernel;
+  WeakOptions sampled;
+  sampled.thinning.method = a.thin.value_or(ThinningMethod::recombination);
+  const bool by_weights_alone = is_random(sampled) && a.order == SiteOrder::tree;
   problem.scales.resize(problem.kinked.size());
   if (scales_wanted)
     problem.scales = kink_scales(problem.source.model(), problem.kinked, a.horizon(), problem.discount_state);
@@ -115,7 +118,8 @@ void choose_treatments(const WeakArguments& a, WeakProblem& problem) {
     if (treatment == KinkTreatment::last_step && f.kinks.size() > most_kinks)
       throw InputError("has more than 64 kinks: --kinks kernel", "--payoff", problem.payoffs[i]);
     if (treatment != KinkTreatment::automatic) continue;
-    treatment = last_step_smooths(problem.scales[i]) && f.kinks.size() <= most_kinks
+    // A tree that is sampled by weights alone moves N nodes a step; families would move all of their children.
+    treatment = last_step_smooths(problem.scales[i]) && f.kinks.size() <= most_kinks && !by_weights_alone
                     ? KinkTreatment::last_step
                     : KinkTreatment::kernel;
   }

@@ -25,6 +25,9 @@ double largest_difference(const std::vector<double>& a, const std::vector<double
 
 double order_of(const CubatureFormula& formula) { return (formula.degree - 1) / 2.0; }
 
+// A checkpoint that is not one of this computation is no failure of a level.
+bool of_checkpoint(const Error& failure) { return failure.where() == "checkpoint"; }
+
 // What ends a computation that has not reached its tolerance, with the reason.
 struct Exhausted {
   std::string reason;
@@ -61,7 +64,12 @@ class Control {
     if (random_ && target_.choose_launches) run_.launches = 16;
     try {
       for (;;) {
-        estimate_or_shorten();
+        try {
+          estimate_or_shorten();
+        } catch (const Error& failure) {
+          if (best_.value.empty()) salvage(failure);
+          throw;
+        }
         keep_best();
         if (bounds_fail_ && (within() || run_.steps >= enough_steps))
           give_up(best_.notes.front() +
@@ -75,6 +83,11 @@ class Control {
       best_.reached = true;
     } catch (const Exhausted& exhausted) {
       best_.limit = exhausted.reason;
+    } catch (const Error& failure) {
+      // What a finer level meets, a node that cannot be moved or a tree that is too large, takes nothing from
+      // the answer of a coarser one.
+      if (best_.value.empty() || of_checkpoint(failure)) throw;
+      best_.limit = told(failure.what());
     }
     best_.ode_solves = solves();
     return std::move(best_);
@@ -276,6 +289,33 @@ class Control {
     }
   }
 
+  // Where even the first number of steps cannot be made: the best of what fewer steps give. Nothing is known of
+  // the error of steps that are too long for the model.
+  void salvage(const Error& failure) {
+    if (of_checkpoint(failure)) return;
+    for (std::size_t m = run_.steps / 2; m >= 1; m /= 2) try {
+        WeakLevels& trees = trees_now();
+        const std::vector<double> X = trees.extrapolated(m), V = trees.value(m),
+                                  deviation = trees.standard_error(m);
+        const std::vector<double> coarser = m > 1 ? trees.value(m / 2) : std::vector<double>(V.size(), 0.0);
+        result_.value.assign(value_count(), 0.0);
+        result_.standard_error = result_.value;
+        result_.error.assign(value_count(), {});
+        rung_ = rung_of(X);
+        for (std::size_t k = 0; k < value_count(); ++k) {
+          const std::size_t i = place(rung_, k);
+          result_.value[k] = X[i];
+          result_.standard_error[k] = deviation[i];
+          result_.error[k].discretisation = std::max(std::abs(X[i]), std::abs(V[i] - coarser[i]));
+          result_.error[k].sampling = 2 * deviation[i];
+        }
+        result_.leaves = trees.leaves(m);
+        run_.steps = m;
+        return keep_best();
+      } catch (const Error&) {  // nor this many
+      }
+  }
+
   static double total_of(const ControlledResult& result) {
     double most = 0;
     for (const WeakErrorSplit& e : result.error) most = std::max(most, e.total());
@@ -290,7 +330,7 @@ class Control {
     best_.error = result_.error;
     best_.leaves = result_.leaves;
     best_.run = run_;
-    best_.run.richardson = true;
+    best_.run.richardson = run_.steps > 1;
     best_.run.steps = steps_of_level(run_, run_.steps);
   }
 
@@ -305,7 +345,6 @@ class Control {
     compare_degrees();
     force_best();
     if (!within()) {
-      if (random_) return true;
       double_steps();
       return false;
     }
@@ -339,19 +378,32 @@ class Control {
                                          1.5 * steps * once * static_cast<double>(total_segments(*guard)) <=
                                      target_.most_solves;
     };
-    const CubatureFormula* guard = affordable(higher, 1) ? higher : affordable(lower, 2) ? lower : nullptr;
-    if (guard == nullptr)
-      give_up(fmt::format("a comparison with another degree would take over {:.2g} ODE solves",
-                          target_.most_solves));
-    WeakRun run = run_;
-    run.options.formula = *guard;
-    WeakLevels levels(model_, payoffs_, run);
-    const std::vector<double> Y = levels.extrapolated(guard == higher ? run_.steps : 2 * run_.steps);
-    pilot_solves_ += levels.ode_solves();
+    std::vector<double> Y, deviation;
+    std::string obstacle = fmt::format("it would take over {:.2g} ODE solves", target_.most_solves);
+    for (const auto& [guard, multiple] :
+         {std::pair{higher, std::size_t{1}}, std::pair{lower, std::size_t{2}}}) {
+      if (!Y.empty() || !affordable(guard, static_cast<double>(multiple))) continue;
+      WeakRun run = run_;
+      run.options.formula = *guard;
+      WeakLevels levels(model_, payoffs_, run);
+      levels.set_launches(run_.launches);
+      try {
+        Y = levels.extrapolated(multiple * run_.steps);
+        deviation = levels.standard_error(multiple * run_.steps);
+      } catch (const Error& failure) {
+        if (of_checkpoint(failure)) throw;
+        obstacle = failure.what();
+      }
+      pilot_solves_ += levels.ode_solves();
+    }
+    if (Y.empty()) give_up("no comparison with another degree: " + obstacle);
     for (std::size_t k = 0; k < value_count(); ++k) {
       double& error = result_.error[k].discretisation;
+      const std::size_t i = place(rung_, k);
+      // Two standard errors of the difference are no sign of anything.
+      const double noise = 2 * std::hypot(result_.standard_error[k], deviation[i]);
       // The other value may be off by a quarter of the difference, on the far side.
-      error = std::max(error, std::abs(result_.value[k] - Y[place(rung_, k)]) * 4 / 3);
+      error = std::max(error, (std::abs(result_.value[k] - Y[i]) - noise) * 4 / 3);
     }
   }
 
@@ -371,16 +423,17 @@ class Control {
     return most > target_.tolerance;
   }
 
-  double largest(double WeakErrorSplit::*part) const {
+  static double largest(const ControlledResult& result, double WeakErrorSplit::*part) {
     double most = 0;
-    for (const WeakErrorSplit& e : result_.error) most = std::max(most, e.*part);
+    for (const WeakErrorSplit& e : result.error) most = std::max(most, e.*part);
     return most;
   }
 
   void refine() {
-    const double steps = largest(&WeakErrorSplit::discretisation),
-                 thinning = largest(&WeakErrorSplit::thinning), ode = largest(&WeakErrorSplit::ode),
-                 sampling = largest(&WeakErrorSplit::sampling), e = target_.tolerance;
+    const double steps = largest(result_, &WeakErrorSplit::discretisation),
+                 thinning = largest(result_, &WeakErrorSplit::thinning),
+                 ode = largest(result_, &WeakErrorSplit::ode),
+                 sampling = largest(result_, &WeakErrorSplit::sampling), e = target_.tolerance;
     double size = 0;
     for (const double value : result_.value) size = std::max(size, std::abs(value));
     if (e < 1e-14 * size) give_up(fmt::format("rounding alone leaves about {:.0e}", 1e-15 * size));
@@ -455,14 +508,15 @@ class Control {
                     steps, size.leaves, size.bytes / 1e9, run_.options.memory_limit / 1e9));
   }
 
-  [[noreturn]] void give_up(const std::string& reason) const {
-    throw Exhausted{
-        fmt::format("not reached by degree {} in {} steps: errors of about {:.1e} by the steps, {:.1e} by "
-                    "thinning, {:.1e} by sampling, {:.1e} by the ODEs; {}",
-                    run_.options.formula.degree, steps_of_level(run_, run_.steps),
-                    largest(&WeakErrorSplit::discretisation), largest(&WeakErrorSplit::thinning),
-                    largest(&WeakErrorSplit::sampling), largest(&WeakErrorSplit::ode), reason)};
+  std::string told(const std::string& reason) const {
+    return fmt::format(
+        "not reached by degree {} in {} steps: errors of about {:.1e} by the steps, {:.1e} by "
+        "thinning, {:.1e} by sampling, {:.1e} by the ODEs; {}",
+        best_.run.options.formula.degree, best_.run.steps, largest(best_, &WeakErrorSplit::discretisation),
+        largest(best_, &WeakErrorSplit::thinning), largest(best_, &WeakErrorSplit::sampling),
+        largest(best_, &WeakErrorSplit::ode), reason);
   }
+  [[noreturn]] void give_up(const std::string& reason) const { throw Exhausted{told(reason)}; }
 
   const Model& model_;
   std::size_t payoffs_a_rung_, rungs_, times_;

@@ -59,7 +59,7 @@ class WeakTree {
       const bool keeps_all = !pruned_ || children <= (on_a_line_ ? few : options_.nodes);
       // The last step need not be made where its leaves were averaged over with the step before.
       if (estimate_.value.size() < expected_values()) {
-        if (by_weight_alone_ && !keeps_all && !(kinks_ && reports(j)))
+        if (by_weight_alone_ && !keeps_all && !averages_families(j))
           step_by_weight(j, random);
         else
           step(j, random, keeps_all || j == steps);
@@ -96,6 +96,11 @@ class WeakTree {
   bool reports(std::size_t j) const {
     if (options_.report_at.empty()) return j + 1 == options_.grid.size();
     return std::binary_search(options_.report_at.begin(), options_.report_at.end(), j);
+  }
+
+  // Whether families of leaves are averaged over that step j makes: all of its children are needed.
+  bool averages_families(std::size_t j) const {
+    return kinks_ && (reports(j) || (two_steps_ && j + 1 < options_.grid.size() && reports(j + 1)));
   }
 
   // Averages over leaves at the end of step j, in families of the nodes `parents` of one generation.
