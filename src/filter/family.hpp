@@ -29,6 +29,12 @@ struct FamilyShape {
     const double u = a * inside + c * (inside * inside - 1) + d * inside * (inside * inside - 3);
     return u + (a + 2 * c * inside + 3 * d * (inside * inside - 1)) * (z - inside);
   }
+  /// du/dz.
+  double slope(double z) const {
+    if (gaussian()) return 1;
+    const double inside = z < -reach ? -reach : z > reach ? reach : z;
+    return a + 2 * c * inside + 3 * d * (inside * inside - 1);
+  }
   /// The z of which u is the image.
   double inverse(double u) const;
 };

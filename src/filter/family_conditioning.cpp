@@ -37,6 +37,7 @@ bool apart(std::span<const FamilyModes::Part> parts, double family_weight) {
 void FamilyUpdate::clear() {
   components.clear();
   points.clear();
+  law.clear();
   quadratic = true;
   far = outside = divided = 0;
 }
@@ -143,6 +144,7 @@ void FamilyConditioning::add_smooth(const Families& prior, const HermiteRule& ru
   }
   const double log_weight = prior.log_weight[i] + std::log(active.s);
   out_->components.add(log_weight + largest + std::log(sum), m + sd * mean, sd * std::sqrt(second / sum));
+  out_->law.add_smooth(prior, i, active.mu, active.s, log_weight, rule, {ratio_.data(), n});
   const bool quadratic = shape.gaussian() && (likelihood_.quadratic() || spread <= rounding * rounding);
   out_->quadratic = out_->quadratic && quadratic;
   if (sd > 0) {
@@ -173,6 +175,9 @@ void FamilyConditioning::condition_hard(const Families& prior, std::size_t point
     double family_weight = -infinity;
     for (const FamilyModes::Part& part : modes_.parts())
       family_weight = log_sum(family_weight, part.log_weight);
+    modes_.tabulate(table_z_, table_below_, table_density_);
+    out_->law.add_table(prior, i, prior.log_weight[i] + family_weight, table_z_, table_below_,
+                        table_density_);
     const bool divided = apart(modes_.parts(), family_weight);
     for (const FamilyModes::Part& part : modes_.parts()) {
       const double log_weight = prior.log_weight[i] + part.log_weight;

@@ -13,6 +13,7 @@
 /// Sarkka 2015, IEEE Trans. Signal Process. 63, 5561-5573); for linear sensors and Gaussian noise that is
 /// Kalman's update, whatever the noise. All else (several modes, kinks, heavy tails, bounds) goes to
 /// FamilyModes, which finds the modes and integrates adaptively.
+#include "wienertree/filter/family_law.hpp"
 #include "wienertree/filter/family_likelihood.hpp"
 #include "wienertree/filter/family_modes.hpp"
 #include "wienertree/filter/hermite_rule.hpp"
@@ -22,6 +23,7 @@ namespace wienertree {
 /// What an observation made of the families.
 struct FamilyUpdate {
   Families components;    ///< Gaussians with the mean and variance of each family, or of each of its modes
+  FamilyLaw law;          ///< the same, exactly: for quantiles and densities
   LinePoints points;      ///< quadrature points of the law: what the next step starts from
   bool quadratic = true;  ///< every log-likelihood was quadratic in z, to rounding
   double far = 0;         ///< root mean square of z under the posterior
@@ -63,7 +65,7 @@ class FamilyConditioning {
   std::vector<HermiteRule> rules_;
   std::vector<Active> active_;
   std::vector<std::size_t> hard_;
-  std::vector<double> ratio_, part_;
+  std::vector<double> ratio_, part_, table_z_, table_below_, table_density_;
   FamilyUpdate* out_ = nullptr;
   std::vector<double> far_, outside_,
       divided_;  ///< of each component: mean of z^2, mass beyond bounds, modes

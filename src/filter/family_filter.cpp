@@ -124,7 +124,8 @@ void FamilyFilter::take_in(const ObservationWindow& window) {
   note_update(window);
   std::swap(families_, update_.components);
   std::swap(points_, update_.points);
-  has_points_ = true;
+  std::swap(law_of_families_, update_.law);
+  has_points_ = law_is_known_ = true;
 }
 
 // N(m, P) = sum_k w_k N(m + sd k/4, P/16), |k| <= 28, w_k proportional to exp(-(k/4)^2 / (2 15/16)): its
@@ -175,6 +176,7 @@ void FamilyFilter::note_update(const ObservationWindow& window) {
 }
 
 void FamilyFilter::move(const ObservationWindow& window) {
+  law_is_known_ = false;
   if (single_ && carry(window.length())) return;
   lay_points(window);
   if (!move_by_transition(window)) move_by_tree(window);
@@ -396,6 +398,12 @@ const Posterior& FamilyFilter::posterior() {
   posterior_.points = posterior_points_;
   posterior_.covariance = posterior_covariance_;
   posterior_.weight = posterior_weight_;
+  posterior_.law = nullptr;
+  if (!points) {
+    if (!law_is_known_) law_of_families_.set(families_);
+    law_of_families_.normalise(bounds_);
+    posterior_.law = &law_of_families_;
+  }
   posterior_.parents = 0;
   posterior_.kept = std::min(options_.nodes, single_ ? std::size_t{1} : std::max(N, points_.size()));
   return posterior_;
@@ -403,9 +411,10 @@ const Posterior& FamilyFilter::posterior() {
 
 void FamilyFilter::exchange_state(StateArchive& archive) {
   archive(families_, single_, exact_, has_points_, points_.x, points_.log_weight, log_evidence_, time_,
-          clock_, thinnings_);
+          clock_, thinnings_, law_is_known_, law_of_families_);
   StateArchive::require(families_.size() > 0 && points_.x.size() == points_.log_weight.size() &&
-                        (!has_points_ || points_.size() > 0) && (!single_ || families_.size() == 1));
+                        (!has_points_ || points_.size() > 0) && (!single_ || families_.size() == 1) &&
+                        (!law_is_known_ || law_of_families_.size() > 0));
   if (!archive.reading()) return;
   flow_before_ = statistics_.flow;
   stale_ = true;

@@ -73,6 +73,8 @@ class FamilyFilter final : public Filter {
   double log_evidence_ = 0, time_ = 0, clock_ = 0;
   std::uint32_t thinnings_ = 0;  ///< so far: streams of random numbers are counted by it
 
+  FamilyLaw law_of_families_;  ///< what quantiles and densities are read from
+  bool law_is_known_ = false;  ///< it is that of families_
   FamilyUpdate update_;
   Generation law_, nodes_, children_;  ///< law_: all points at the start of a gap
   Selection selection_;

@@ -198,6 +198,66 @@ void FamilyModes::quadrature(std::span<const Mode> modes) {
   }
 }
 
+// Nodes come in intervals of 8, in which the integral of the interpolating polynomial, sum_k w_k P_m(t_k) f_k (2m + 1)/2
+// times P_m, is known up to each of them.
+void FamilyModes::tabulate(std::vector<double>& z, std::vector<double>& below, std::vector<double>& density) {
+  constexpr std::size_t points = 8;
+  // integral[j][k] = int_{-1}^{t_j} l_k, in the order in which `legendre` lays its nodes.
+  static const auto integral = [] {
+    std::array<double, points> t{}, w{};
+    for (std::size_t n = 0; n < points; ++n) {
+      t[n] = (n % 2 == 0 ? -1 : 1) * legendre_node[n / 2];
+      w[n] = legendre_weight[n / 2];
+    }
+    const auto P = [](std::size_t m, double x) { return std::legendre(static_cast<unsigned>(m), x); };
+    std::array<std::array<double, points>, points> table{};
+    for (std::size_t j = 0; j < points; ++j)
+      for (std::size_t k = 0; k < points; ++k) {
+        double sum = (1 + t[j]) / 2;
+        for (std::size_t m = 1; m < points; ++m) sum += P(m, t[k]) * (P(m + 1, t[j]) - P(m - 1, t[j])) / 2;
+        table[j][k] = w[k] * sum;
+      }
+    return table;
+  }();
+  const std::size_t intervals = node_.size() / points;
+  order_.resize(intervals);
+  for (std::size_t i = 0; i < intervals; ++i) order_[i] = i;
+  std::sort(order_.begin(), order_.end(),
+            [&](std::size_t a, std::size_t b) { return node_[a * points] < node_[b * points]; });
+  z.assign(1, grid_.front());
+  below.assign(1, 0.0);
+  density.assign(1, 0.0);
+  double before = 0;
+  for (const std::size_t i : order_) {
+    const std::size_t first = i * points;
+    std::array<double, points> f;
+    std::array<std::size_t, points> sorted = {6, 4, 2, 0, 1, 3, 5, 7};
+    double whole = 0;
+    for (std::size_t n = 0; n < points; ++n) {
+      f[n] = std::exp(height_[first + n] - largest_);
+      whole += length_[first + n] * f[n];
+    }
+    const double half = length_[first] / legendre_weight[0];
+    for (const std::size_t j : sorted) {
+      double sum = 0;
+      for (std::size_t k = 0; k < points; ++k) sum += integral[j][k] * f[k];
+      z.push_back(node_[first + j]);
+      below.push_back(before + half * sum);
+      density.push_back(f[j]);
+    }
+    before += whole;
+  }
+  z.push_back(grid_.back());
+  below.push_back(before);
+  density.push_back(0.0);
+  for (std::size_t n = 0; n < z.size(); ++n) {
+    below[n] = std::clamp(below[n] / before, n == 0 ? 0.0 : below[n - 1], 1.0);
+    density[n] /= before;
+  }
+  density.front() = density[1];
+  density.back() = density[z.size() - 2];
+}
+
 void FamilyModes::compress(Part& part, std::span<const double> x, std::span<const double> w,
                            std::size_t points) {
   const auto [low, high] = std::minmax_element(x.begin(), x.end());

@@ -32,6 +32,9 @@ class FamilyModes {
               const LineBounds& bounds);
   /// Integrates; to be called after `find` for the same family. Each part is put on at most `points` points.
   void integrate(std::size_t points);
+  /// The distribution function and the density of z at the nodes of the quadrature and at its ends, for a mass of 1;
+  /// after `integrate`. A family of sd 0, a point, has no use for it.
+  void tabulate(std::vector<double>& z, std::vector<double>& below, std::vector<double>& density);
   std::span<const Part> parts() const { return {parts_.data(), count_}; }
   /// Mass of the family beyond the bounds.
   double outside() const { return outside_; }
@@ -64,6 +67,7 @@ class FamilyModes {
   std::vector<Mode> modes_, kept_;
   std::vector<double> ends_, cuts_;
   std::vector<Interval> stack_;
+  std::vector<std::size_t> order_;
   std::vector<double> node_, height_, length_;  ///< accepted quadrature nodes, g there, their weights
   std::vector<double> x_, w_, zs_;
   recombination::DiscreteGauss gauss_;

@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <numbers>
 
+#include "wienertree/filter/family_law.hpp"
 #include "wienertree/numeric/clones.hpp"
 #include "wienertree/numeric/lane_sum.hpp"
 
@@ -164,6 +165,11 @@ class AtomQuantiles {
 Marginal::Marginal(const Posterior& posterior, std::size_t i)
     : atoms_(posterior.points.component(i)), weight_(posterior.weight) {
   std::vector<Family> families;
+  if (posterior.law != nullptr && i == 0) {
+    law_ = posterior.law;
+    has_density_ = law_->has_density();
+    return;
+  }
   if (posterior.dirac() && posterior.parents == 0) return;
   if (posterior.dirac()) {
     add_families(posterior.parents, families);
@@ -270,6 +276,7 @@ void Marginal::merge(std::vector<Family>& families) {
 }
 
 double Marginal::distribution(double x) const {
+  if (law_ != nullptr) return law_->distribution(x);
   double sum = 0;
   for (const Gaussian& g : gaussians_) {
     if (!(g.sd > 0)) {
@@ -287,6 +294,7 @@ double Marginal::distribution(double x) const {
 
 double Marginal::density(double x) const {
   assert(has_density());
+  if (law_ != nullptr) return law_->density(x);
   return std::max(0.0, sum_of_densities(x));
 }
 
@@ -322,6 +330,7 @@ double Marginal::gaussian_quantile(double level) const {
 }
 
 void Marginal::quantiles(std::span<const double> levels, std::span<double> out) const {
+  if (law_ != nullptr) return law_->quantiles(levels, out);
   if (!gaussians_.empty()) {
     for (std::size_t q = 0; q < levels.size(); ++q) {
       out[q] = gaussian_quantile(levels[q]);

@@ -7,7 +7,7 @@
 
 namespace wienertree {
 
-/// A Gaussian sum is used as it is. Children of a tree stand for a diffusion's step: c atoms a parent, which pile up on a
+/// The law of families on the line (family_law.hpp) is used as it is, and so is a Gaussian sum. Children of a tree stand for a diffusion's step: c atoms a parent, which pile up on a
 /// lattice of the width of a step, and the parents themselves are far apart beside a short step, so that the atoms' own
 /// distribution function is a staircase. Each family is therefore replaced by the Gaussian N(m_i, C_i) of its mean and
 /// variance, the leading order of the step's true law, and the sum of these is smoothed by a Gaussian kernel of standard
@@ -51,6 +51,7 @@ class Marginal {
   void widen(const std::vector<Gaussian>& plain, double h);
   double sum_of_densities(double x) const;
 
+  const FamilyLaw* law_ = nullptr;
   bool has_density_ = false;
   double lowest_ = 0, highest_ = 0;         ///< nodes with mass, of families
   std::vector<Gaussian> gaussians_;         ///< empty for Dirac masses

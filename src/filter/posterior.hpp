@@ -9,6 +9,8 @@
 
 namespace wienertree {
 
+class FamilyLaw;
+
 /// pi = sum_n weight_n N(points_n, covariance_n). Views into the filter's memory, valid until its next step.
 struct Posterior {
   double time = 0;
@@ -20,6 +22,9 @@ struct Posterior {
   /// n % parents. 0 where nodes have no parents. Marginal spreads each family.
   std::size_t parents = 0;
   std::size_t kept = 0;  ///< distinct nodes that thinning kept for the next step; N where nothing is thinned
+
+  /// The law of the first component to more than its mean and variance, where the filter knows it, or null.
+  const FamilyLaw* law = nullptr;
 
   std::size_t size() const { return points.nodes(); }
   bool dirac() const { return covariance.components() == 0; }
