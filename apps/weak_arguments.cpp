@@ -298,9 +298,10 @@ std::vector<CubatureFormula> weak_formulas(const WeakArguments& a, const WeakPro
                      *a.formula);
   if (a.degree || a.formula) return {choose_formula(a.degree, a.formula, p)};
   std::vector<CubatureFormula> formulas;
-  // The highest degree has none above it to be compared with; the exact transition has no rule above degree 7.
-  std::vector<int> degrees = formula_degrees(p);
-  if (problem.transition) std::erase_if(degrees, [](int degree) { return degree > 7; });
+  // Of the exact transition the best rule costs hardly more than the others.
+  const std::vector<int> degrees = formula_degrees(p);
+  if (problem.transition) return {choose_formula(std::min(7, degrees.back()), {}, p)};
+  // The highest degree has none above it to be compared with.
   for (const int degree : degrees)
     if (degree > 3 && (degree < degrees.back() || degree == 5))
       formulas.push_back(choose_formula(static_cast<std::uint64_t>(degree), {}, p));

@@ -148,6 +148,24 @@ class WeakTree {
         for (std::size_t k = 0; k < p; ++k) square += diffusion_(i * p + k, n) * diffusion_(i * p + k, n);
         deviation_(i, n) = root * std::sqrt(square);
       }
+    if (options_.transition) scale_integrals();
+  }
+
+  // What an exact transition carries without noise are integrals of variances: the law of a price given I has a
+  // variance in proportion to it, so that averages vary with I on a relative scale, down to half of its mean.
+  void scale_integrals() {
+    for (std::size_t i = 0; i < children_.states.components(); ++i) {
+      const auto deviation = deviation_.component(i);
+      if (*std::max_element(deviation.begin(), deviation.end()) > 0) continue;
+      const auto I = children_.states.component(i);
+      double sum = 0, mass = 0;
+      for (std::size_t n = 0; n < children_.size(); ++n) {
+        const double w = std::exp(children_.log_weight[n]);
+        sum += w * std::abs(I[n]);
+        mass += w;
+      }
+      for (std::size_t n = 0; n < children_.size(); ++n) deviation[n] = std::abs(I[n]) + 0.5 * sum / mass;
+    }
   }
 
   void require_success(std::size_t j) const {
