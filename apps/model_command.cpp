@@ -8,6 +8,7 @@
 #include "commands.hpp"
 #include "data_directory.hpp"
 #include "output.hpp"
+#include "wienertree/model/jacobi.hpp"
 #include "wienertree/model/text_model.hpp"
 
 namespace wienertree::app {
@@ -105,7 +106,13 @@ std::string show_model(const std::string& name, const Assignments& parameters) {
   text += fmt::format("\nflow of a node: {}\nexact filter: {}{}\n",
                       a.has_exact_flow ? "in closed form" : "by an ODE solver", a.exact_filter_name,
                       a.exact_filter_reason.empty() ? "" : " (" + a.exact_filter_reason + ")");
-  if (a.square_roots.empty()) text += fmt::format("exact transition: none ({})\n", a.square_roots_reason);
+  if (const auto jacobi = jacobi_process(model))
+    text += fmt::format(
+        "exact transition: {0}: Jacobi's, d{0} = ({1:g} + {2:g} {0}) dt + sqrt({3:g} ({0} - {4:g})({5:g} - "
+        "{0})) dB\n",
+        model.state_names[0], jacobi->a, jacobi->b, jacobi->c, jacobi->lower, jacobi->upper);
+  else if (a.square_roots.empty())
+    text += fmt::format("exact transition: none ({})\n", a.square_roots_reason);
   for (const std::string& line : a.square_roots) text += fmt::format("exact transition: {}\n", line);
   return text;
 }

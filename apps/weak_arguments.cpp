@@ -10,6 +10,7 @@
 #include "formula_choice.hpp"
 #include "tree_choices.hpp"
 #include "wienertree/cubature/lie_formula.hpp"
+#include "wienertree/tree/jacobi_transition.hpp"
 #include "wienertree/tree/square_root_transition.hpp"
 #include "wienertree/weak/conditional_price.hpp"
 
@@ -179,7 +180,7 @@ void add_weak_options(CLI::App& app, WeakArguments& a) {
 
 namespace {
 
-// Moves square-root processes by their exact transition. A price that is lognormal given these is integrated out:
+// Moves square-root processes and Jacobi's by their exact transition. A price that is lognormal given these is integrated out:
 // payoffs become smooth functions of the variances and their integrals.
 void use_exact_transition(const WeakArguments& a, WeakProblem& problem) {
   if (!a.square_roots.value_or(true)) return;
@@ -187,7 +188,12 @@ void use_exact_transition(const WeakArguments& a, WeakProblem& problem) {
                          a.degree.value_or(5) > 7 ||
                          a.thin.value_or(ThinningMethod::recombination) != ThinningMethod::recombination;
   const auto& structure = problem.source.square_roots();
-  if (other_way || !structure) return;
+  if (other_way) return;
+  if (!structure) {
+    if (const auto jacobi = jacobi_process(problem.source.model()))
+      problem.transition = std::make_shared<JacobiTransition>(*jacobi);
+    return;
+  }
   if (structure->price && a.horizons.size() > 1) return;  // it is integrated out at one time
   if (!structure->price) {
     SquareRootStructure own = *structure;
@@ -198,7 +204,9 @@ void use_exact_transition(const WeakArguments& a, WeakProblem& problem) {
   const ConditionalPrice price(*structure, problem.source.model().initial);
   for (std::size_t i = 0; i < problem.kinked.size(); ++i) {
     KinkedFunction smooth;
-    smooth.exact = price.average(problem.kinked[i].exact, problem.kinked[i].kinks, a.horizon());
+    const KinkedFunction& f = problem.kinked[i];
+    smooth.exact = !problem.discount_state ? price.average_of_rest(f.exact, f.kinks, a.horizon())
+                                           : price.average(f.exact, f.kinks, a.horizon());
     problem.kinked[i] = std::move(smooth);
   }
   if (problem.discount_state) problem.discount_state = price.place(*problem.discount_state);

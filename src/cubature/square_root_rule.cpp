@@ -3,11 +3,11 @@
 #include <fmt/format.h>
 
 #include <Eigen/Core>
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <vector>
 
+#include "wienertree/cubature/gauss_moments.hpp"
 #include "wienertree/numeric/error.hpp"
 
 namespace wienertree {
@@ -35,73 +35,7 @@ Eigen::MatrixXd exponential(Eigen::MatrixXd A) {
   return sum;
 }
 
-using Four = std::array<double, 4>;
-using LongNine = std::array<long double, 9>;
-
-// Of a law of mean 0 and variance 1: nodes z_m, weights, and the orthonormal polynomials e_i, i < q, at the
-// nodes and by coefficients.
-struct GaussRule {
-  Four node{}, weight{};
-  std::array<Four, 4> value{}, coefficient{};  // e_i(z_m); of z^r in e_i
-};
-
-// Eigenvalues of the symmetric tridiagonal matrix with the diagonal alpha and the roots of beta beside it: the
-// nodes (Golub, Welsch 1969). Weights are 1/sum_i e_i^2, which keeps the relative accuracy of small ones.
-GaussRule gauss_rule(const std::array<long double, 4>& alpha, const std::array<long double, 4>& beta,
-                     std::size_t q) {
-  using Vector = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, 4, 1>;
-  using Matrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, 4, 4>;
-  const auto size = static_cast<Eigen::Index>(q);
-  Vector diagonal(size), beside(size - 1);
-  Four a{}, b{};
-  for (std::size_t k = 0; k < q; ++k) {
-    diagonal(static_cast<Eigen::Index>(k)) = a[k] = static_cast<double>(alpha[k]);
-    b[k] = std::sqrt(static_cast<double>(beta[k]));
-    if (k > 0) beside(static_cast<Eigen::Index>(k) - 1) = b[k];
-  }
-  Eigen::SelfAdjointEigenSolver<Matrix> solver(size);
-  solver.computeFromTridiagonal(diagonal, beside, Eigen::EigenvaluesOnly);
-  GaussRule rule;
-  // e_{i+1} = ((z - a_i) e_i - b_i e_{i-1}) / b_{i+1}
-  rule.coefficient[0][0] = 1;
-  for (std::size_t i = 0; i + 1 < q; ++i)
-    for (std::size_t r = 0; r <= i + 1; ++r)
-      rule.coefficient[i + 1][r] = ((r > 0 ? rule.coefficient[i][r - 1] : 0) - a[i] * rule.coefficient[i][r] -
-                                    (i > 0 ? b[i] * rule.coefficient[i - 1][r] : 0)) /
-                                   b[i + 1];
-  double total = 0;
-  for (std::size_t m = 0; m < q; ++m) {
-    const double z = rule.node[m] = solver.eigenvalues()(static_cast<Eigen::Index>(m));
-    double squares = rule.value[0][m] = 1;
-    for (std::size_t i = 0; i + 1 < q; ++i) {
-      const double e = ((z - a[i]) * rule.value[i][m] - (i > 0 ? b[i] * rule.value[i - 1][m] : 0)) / b[i + 1];
-      rule.value[i + 1][m] = e;
-      squares += e * e;
-    }
-    rule.weight[m] = 1 / squares;
-    total += rule.weight[m];
-  }
-  for (std::size_t m = 0; m < q; ++m) rule.weight[m] /= total;
-  return rule;
-}
-
-// The rule of the law with the moments m_0 .. m_{2q-1}: Chebyshev's algorithm.
-GaussRule rule_of_moments(const LongNine& m, std::size_t q) {
-  std::array<long double, 4> alpha{}, beta{};
-  LongNine current = m, previous{};
-  beta[0] = 1;
-  alpha[0] = m[1];
-  for (std::size_t k = 1; k < q; ++k) {
-    LongNine next{};
-    for (std::size_t j = k; j < 2 * q - k; ++j)
-      next[j] = current[j + 1] - alpha[k - 1] * current[j] - (k > 1 ? beta[k - 1] * previous[j] : 0);
-    beta[k] = next[k] / current[k - 1];
-    alpha[k] = next[k + 1] / next[k] - current[k] / current[k - 1];
-    previous = current;
-    current = next;
-  }
-  return gauss_rule(alpha, beta, q);
-}
+using Four = GaussRule::Values;
 
 }  // namespace
 
@@ -179,7 +113,7 @@ SquareRootRule::Children SquareRootRule::children(double x) const {
       binomial = binomial * static_cast<long double>(k - j) / static_cast<long double>(j);
     }
   }
-  const GaussRule rule = rule_of_moments(m, q_);
+  const GaussRule rule = gauss_rule(m, q_);
   result.weight = rule.weight;
   for (std::size_t k = 0; k < q_; ++k) result.v[k] = std::max(0.0, expected + sd * rule.node[k]);
   // E[I^j v^i] at x, then E[I^j z^i], z = (v - mean)/sd.

@@ -196,6 +196,48 @@ class Average {
 ConditionalPrice::ConditionalPrice(SquareRootStructure structure, std::vector<double> start)
     : structure_(std::move(structure)), start_(std::move(start)) {}
 
+std::optional<double> ConditionalPrice::forward(double T) const {
+  const SquareRootStructure::Price& price = *structure_.price;
+  for (std::size_t k = 0; k < structure_.components.size(); ++k) {
+    const double half = (price.correlated[k] * price.correlated[k] + price.independent[k]) / 2;
+    if (std::abs(price.drift[k] + half) > 1e-12 * half) return std::nullopt;
+  }
+  const double u = start_[price.state];
+  return price.logarithmic ? std::exp(u + price.rate * T) : u * std::exp(price.rate * T);
+}
+
+double ConditionalPrice::slope(const BatchFunction& f, double T) const {
+  const std::optional<double> mean = forward(T);
+  if (!mean) return 0;
+  const SquareRootStructure::Price& price = *structure_.price;
+  Batch far(start_.size(), 2);
+  std::array<double, 2> at{1e8 * *mean, 1e9 * *mean}, value{};
+  for (std::size_t n = 0; n < 2; ++n)
+    for (std::size_t i = 0; i < start_.size(); ++i)
+      far(i, n) = i != price.state ? start_[i] : price.logarithmic ? std::log(at[n]) : at[n];
+  f(far, value);
+  const double near = value[0] / at[0], further = value[1] / at[1];
+  return std::isfinite(further) && std::abs(near - further) <= 1e-3 * std::abs(further) ? further : 0;
+}
+
+BatchFunction ConditionalPrice::average_of_rest(const BatchFunction& f,
+                                                const std::vector<BatchFunction>& kinks, double T) const {
+  const double growth = slope(f, T);
+  if (growth == 0) return average(f, kinks, T);
+  const SquareRootStructure::Price& price = *structure_.price;
+  const BatchFunction rest = [f, growth, state = price.state, logarithmic = price.logarithmic](
+                                 ConstBatchView x, std::span<double> out) {
+    f(x, out);
+    for (std::size_t n = 0; n < out.size(); ++n)
+      out[n] -= growth * (logarithmic ? std::exp(x(state, n)) : x(state, n));
+  };
+  return [averaged = average(rest, kinks, T), mean = growth * *forward(T)](ConstBatchView x,
+                                                                           std::span<double> out) {
+    averaged(x, out);
+    for (double& value : out) value += mean;
+  };
+}
+
 BatchFunction ConditionalPrice::average(const BatchFunction& f, const std::vector<BatchFunction>& kinks,
                                         double T) const {
   return [structure = structure_, start = start_, f, kinks, T](ConstBatchView x, std::span<double> out) {

@@ -52,7 +52,9 @@ class Control {
   }
 
   ControlledResult operator()() {
-    for (const BoundTrouble& trouble : bound_troubles(model_))
+    // An exact transition has no trouble with bounds.
+    for (const BoundTrouble& trouble :
+         run_.options.transition ? std::vector<BoundTrouble>{} : bound_troubles(model_))
       if (reaches(trouble)) best_.notes.push_back(trouble.reason);
     bounds_fail_ = !best_.notes.empty();
     choose_formula();

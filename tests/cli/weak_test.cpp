@@ -170,12 +170,11 @@ TEST_CASE(
 
 TEST_CASE("weak: a bound that takes the order is never claimed to be within the tolerance") {
   const Workplace place;
-  // 4 kappa theta / sigma^2 = 0.16; the bond's closed form is 0.7310124856 (Cox, Ingersoll, Ross 1985).
-  // A root of a product is none that an exact transition is known for.
+  // The drift is not affine: no exact transition is known.
   place.write(
       "held.toml",
       "name = \"held\"\nconvention = \"ito\"\n[state]\nx = { initial = 0.3, lower = 0.0, upper = 1.0, "
-      "boundary = \"clamp\" }\n[drift]\nx = \"0.5*(0.4-x)\"\n[diffusion]\nx = [\"sqrt(x*(1-x))\"]\n");
+      "boundary = \"clamp\" }\n[drift]\nx = \"0.5*(0.4-x^3)\"\n[diffusion]\nx = [\"sqrt(x*(1-x))\"]\n");
   const Outcome held = place.run("weak held.toml --horizon 1 --payoff x^2 --tolerance 1e-3 --quiet");
   CHECK(held.code == 1);
   CHECK_THAT(held.err, Catch::Contains("leads out of the bound x = 0"));
@@ -184,6 +183,29 @@ TEST_CASE("weak: a bound that takes the order is never claimed to be within the 
               "name = \"far\"\nconvention = \"ito\"\n[state]\nf = { initial = 100.0, lower = 0.0, boundary = "
               "\"absorb\" }\n[drift]\nf = \"0\"\n[diffusion]\nf = [\"0.8*f^0.7\"]\n");
   CHECK(place.run("weak far.toml --horizon 1 --payoff max(f-100,0) --tolerance 1e-2 --quiet").code == 0);
+}
+
+TEST_CASE("weak: Jacobi's diffusion by its exact transition, whether or not it reaches its bounds") {
+  const Workplace place;
+  const auto model = [&](const std::string& drift, const std::string& boundary) {
+    place.write(
+        "jacobi.toml",
+        "name = \"jacobi\"\nconvention = \"ito\"\n[state]\nx = { initial = 0.3, lower = 0.0, upper = 1.0, "
+        "boundary = \"" +
+            boundary + "\" }\n[drift]\nx = \"" + drift + "\"\n[diffusion]\nx = [\"sqrt(x*(1-x))\"]\n");
+  };
+  // The equations of its moments: E x^2 = 0.2103080610472816, E x^4 = 0.1234218509112919.
+  model("0.5*(0.4-x)", "clamp");
+  const auto rows = rows_of(place, "jacobi.toml --horizon 1 --payoff x^2 --payoff x^4 --tolerance 1e-6");
+  CHECK(rows[0]["value"].get<double>() == Approx(0.2103080610472816).epsilon(1e-12));
+  CHECK(rows[1]["value"].get<double>() == Approx(0.1234218509112919).epsilon(1e-12));
+  CHECK_THAT(
+      place.run("model show jacobi.toml").out,
+      Catch::Contains("exact transition: x: Jacobi's, dx = (0.2 + -0.5 x) dt + sqrt(1 (x - 0)(1 - x)) dB"));
+  // Wright and Fisher's: 0.21 e^{-1}.
+  model("0", "absorb");
+  CHECK(value_of(place, "jacobi.toml --horizon 1 --payoff x*(1-x) --steps 4") ==
+        Approx(0.21 * std::exp(-1)).epsilon(1e-12));
 }
 
 TEST_CASE("weak: several horizons and payoffs from one tree") {
