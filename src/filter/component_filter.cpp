@@ -20,13 +20,6 @@ constexpr double negligible = 1e-14;  // of the largest weight
 // than the shoulders of a heavy tail, at the price of twice the area in two dimensions.
 constexpr double posterior_widening = 2;
 
-// Standard deviation of the logarithm of exact over linearised likelihood in a component above which it is split: a
-// degree-5 rule then errs by about its cube.
-constexpr double sharp = 0.05;
-
-// Components are split to no less than this part of the posterior's width before they are conditioned.
-constexpr double narrowest = 0.1;
-
 // Departure of a component from Gaussian over a substep, in units of FilterOptions::substep_tolerance. Merging, once
 // a substep, costs little in two dimensions and much in four, where patches are wide.
 double substep_factor(std::size_t d) { return d == 2 ? 0.1 : d == 3 ? 0.3 : 1.0; }
@@ -72,7 +65,7 @@ ComponentFilter::ComponentFilter(const Model& model, const FilterOptions& option
       affine_(affine_signal(model_)),
       path_(model_, equations_),
       moving_(options.threads) {
-  if (model_.density) conditioning_.emplace(model_);
+  if (model_.density) update_.emplace(model_);
   start();
   shared_noise_ = one_noise_for_all();
 }
@@ -265,7 +258,8 @@ void ComponentFilter::narrow(std::size_t nodes) {
   ComponentMerge::drop_negligible(components_, negligible);
   const MixtureMoments law = moments(components_);
   if (!(law.covariance.diagonal().maxCoeff() > 0)) return;
-  split_.split(components_, law.covariance, kappa_, 4 * nodes, scratch_, &threads_);
+  split_.split(components_, law.covariance, kappa_, 4 * nodes, (d_ == 2 ? 16 : 4) * nodes, scratch_,
+               &threads_);
   components_.swap(scratch_);
   merge_.merge(components_, nodes);
 }
@@ -291,7 +285,8 @@ void ComponentFilter::divide_by(const Tilt& tilt) {
   Eigen::MatrixXd inverse = eigen.vectors *
                             (1 / eigen.values.array().max(1e-9 * largest)).matrix().asDiagonal() *
                             eigen.vectors.transpose();
-  split_.split(rest, inverse, 0.7, 0, parts, &threads_);
+  constexpr std::size_t all_it_takes = 1 << 18;
+  split_.split(rest, inverse, 0.7, 0, all_it_takes, parts, &threads_);
   std::vector<std::uint32_t> still_wide;
   divide(parts, tilt, still_wide, &threads_);
   if (!still_wide.empty())
@@ -315,9 +310,9 @@ Tilt ComponentFilter::expanded_tilt(std::span<const double> y, double clock, con
     const double sd =
         std::sqrt(std::max(0.0, law.covariance(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(i))));
     for (std::size_t k = 0; k < d_; ++k) L(i * d_ + k, 0) = i == k ? 1.0 : 0.0;
-    step(i, 0) = (conditioning_->expansion().additive() ? 1e-3 : 0.1) * sd;
+    step(i, 0) = (update_->expansion().additive() ? 1e-3 : 0.1) * sd;
   }
-  conditioning_->expansion().expand(y, clock, x, L, step, value, gradient, curvature, scratch);
+  update_->expansion().expand(y, clock, x, L, step, value, gradient, curvature, scratch);
   return {law.mean, square_of<Eigen::Dynamic>(curvature, d_, 0), vector_of<Eigen::Dynamic>(gradient, d_, 0)};
 }
 
@@ -325,14 +320,14 @@ std::vector<Tilt> ComponentFilter::plan(const ObservationWindow& window, std::sp
                                         const MixtureMoments& law, std::size_t K, unsigned steps) {
   const LawMoments start{law.mean, law.covariance};
   const double end = clock_ + window.length();
-  if (conditioning_->expansion().linear_gaussian())
+  if (update_->expansion().linear_gaussian())
     return path_.plan(start, clock_, window.length(), K, steps,
                       [&](const LawMoments& reference) { return expanded_tilt(y, end, reference); });
   const GaussianComponents before = components_;
-  substeps(std::vector<Tilt>(K + 1, Tilt::none(d_)), window.length(), steps,
-           std::max<std::size_t>(60, options_.nodes / 4));
+  const std::size_t nodes = std::max<std::size_t>(60, options_.nodes / 4);
+  substeps(std::vector<Tilt>(K + 1, Tilt::none(d_)), window.length(), steps, nodes);
   const MixtureMoments predicted = moments(components_);
-  split_and_weigh(y, end);
+  take_in(y, end, nodes);
   const MixtureMoments posterior = moments(components_);
   pilot_evidence_ = posterior.log_mass;
   components_ = before;
@@ -346,13 +341,13 @@ std::vector<Tilt> ComponentFilter::plan(const ObservationWindow& window, std::sp
 void ComponentFilter::weigh(const ObservationWindow& window, std::span<const double> y, double clock) {
   if (y.empty() || missing(y)) return;
   check_reach(window, y, clock);
-  const double departure = split_and_weigh(y, clock);
-  if (departure > 0.5)
+  const double spread = take_in(y, clock, options_.nodes);
+  if (spread > 0.15)
     warn(WarningKind::unfit_tilt, window.end,
-         fmt::format("components of a tenth of the law's width are too wide for the likelihood, whose "
-                     "logarithm departs "
-                     "from a quadratic by {:.2g} in them",
-                     departure));
+         fmt::format("more components than {} were needed for the likelihood, whose logarithm departs from a "
+                     "quadratic "
+                     "by {:.2g} in those there are",
+                     8 * options_.nodes, spread));
   const LargestLogWeight largest = largest_log_weight(components_.log_weight);
   if (!largest.all_valid || !(largest.value > -std::numeric_limits<double>::infinity()))
     throw RunError("the observation has no likelihood", place_and_observation(window));
@@ -369,72 +364,17 @@ void ComponentFilter::weigh(const ObservationWindow& window, std::span<const dou
                      components_.size()));
 }
 
-// The covariance S of a law, made so wide that nothing is split in the directions of which the likelihood knows
-// nothing: with G = E grad l grad l^T under the predicted law, in coordinates in which S is 1, those in which l varies
-// by less than .03 over a standard deviation.
-Eigen::MatrixXd ComponentFilter::informed(std::span<const double> y, double clock,
-                                          const MixtureMoments& predicted, const MixtureMoments& law,
-                                          double kappa) {
-  const GaussianCubature& rule = equations_.rule();
-  const auto points = static_cast<std::size_t>(rule.weights.size());
-  const auto rows = static_cast<Eigen::Index>(d_);
-  const Eigen::MatrixXd L = semidefinite_root(predicted.covariance);
-  const Whitening<Eigen::Dynamic> white{SmallSquare<Eigen::Dynamic>(law.covariance)};
-  Batch x(d_, points), directions(d_ * d_, points), step(d_, points), gradient(d_, points),
-      curvature(d_ * d_, points);
-  std::vector<double> value(points);
-  for (std::size_t q = 0; q < points; ++q) {
-    put_vector(Eigen::VectorXd(predicted.mean + L * rule.points.col(static_cast<Eigen::Index>(q))), x, q);
-    put_square(white.axes, directions, q);
-    for (std::size_t i = 0; i < d_; ++i) step(i, q) = 1e-2;
-  }
-  ObservationExpansion::Scratch scratch;
-  conditioning_->expansion().expand(y, clock, x, directions, step, value, gradient, curvature, scratch);
-  SmallSquare<Eigen::Dynamic> G = SmallSquare<Eigen::Dynamic>::Zero(rows, rows);
-  for (std::size_t q = 0; q < points; ++q) {
-    const SmallVector<Eigen::Dynamic> g = vector_of<Eigen::Dynamic>(gradient, d_, q);
-    if (g.allFinite()) G += rule.weights(static_cast<Eigen::Index>(q)) * g * g.transpose();
-  }
-  const SymmetricEigen<Eigen::Dynamic> eigen(G);
-  SmallVector<Eigen::Dynamic> scale(rows);
-  for (Eigen::Index i = 0; i < rows; ++i) scale(i) = eigen.values(i) > 1e-3 ? 1.0 : 2 / (kappa * kappa);
-  const SmallSquare<Eigen::Dynamic> axes = white.axes * eigen.vectors;
-  return axes * scale.asDiagonal() * axes.transpose();
-}
-
-// Components that are too wide for the likelihood are split in the coordinates of the posterior that they gave,
-// tilted towards it, to half of its width and less.
-double ComponentFilter::split_and_weigh(std::span<const double> y, double clock) {
-  predicted_ = components_;
-  double departure = conditioning_->condition(y, clock, components_, &threads_).departure;
-  const MixtureMoments before = moments(predicted_);
-  double kappa = 0.5;
-  for (int round = 0; round < 4; ++round) {
-    if (!(departure > sharp)) return 0;
-    const MixtureMoments after = moments(components_);
-    const Tilt tilt =
-        tilt_between({before.mean, before.covariance}, {after.mean, posterior_widening * after.covariance});
-    components_ = predicted_;
-    multiply(components_, tilt, &threads_);
-    ComponentMerge::drop_negligible(components_, negligible);
-    const MixtureMoments law = moments(components_);
-    split_.split(components_, informed(y, clock, before, law, kappa), kappa, 8 * options_.nodes, scratch_,
-                 &threads_);
-    components_.swap(scratch_);
-    ComponentMerge::drop_negligible(components_, 1e-12);
-    merge_.merge(components_, 8 * options_.nodes);
-    divide_by(tilt);
-    departure = conditioning_->condition(y, clock, components_, &threads_).departure;
-    if (kappa <= narrowest) break;
-    // The departure falls with the square of the width, or faster.
-    kappa = std::clamp(kappa * std::sqrt(sharp / departure), narrowest, 0.7 * kappa);
-  }
-  return departure > sharp ? departure : 0;
+// Divides what the likelihood calls for, and conditions.
+double ComponentFilter::take_in(std::span<const double> y, double clock, std::size_t nodes) {
+  const ComponentUpdate::Limits limits{0.5 * options_.substep_tolerance, (d_ == 2 ? 24 : 8) * nodes};
+  const double left = update_->condition(y, clock, limits, components_, &threads_);
+  if (components_.size() > 8 * nodes) merge_.merge(components_, 8 * nodes);
+  return left;
 }
 
 // (y - predicted)^2/S of each component of y with Gaussian noise.
 void ComponentFilter::check_reach(const ObservationWindow& window, std::span<const double> y, double clock) {
-  const std::vector<double>& R = conditioning_->expansion().gaussian_variances();
+  const std::vector<double>& R = update_->expansion().gaussian_variances();
   if (R.empty()) return;
   const MixtureMoments law = moments(components_);
   const GaussianCubature& rule = equations_.rule();

@@ -2,9 +2,9 @@
 /// The filter for discrete observations of signals in several dimensions: a sum of Gaussians with covariances.
 #include <optional>
 
-#include "wienertree/filter/component_conditioning.hpp"
 #include "wienertree/filter/component_merge.hpp"
 #include "wienertree/filter/component_split.hpp"
+#include "wienertree/filter/component_update.hpp"
 #include "wienertree/filter/filter.hpp"
 #include "wienertree/filter/kalman_filter.hpp"
 #include "wienertree/filter/moment_equations.hpp"
@@ -26,7 +26,7 @@ namespace wienertree {
 /// the moments of its prediction to the mean and twice the covariance of its posterior: it covers all modes, and none
 /// of them is lost. Where both filters disagree by more than .5 in log evidence a warning says so.
 ///
-/// Components too wide for the likelihood are split once more before they are conditioned.
+/// Components too wide for the likelihood are divided where they are conditioned (component_update.hpp).
 class ComponentFilter final : public Filter {
  public:
   ComponentFilter(const Model& model, const FilterOptions& options);
@@ -53,10 +53,8 @@ class ComponentFilter final : public Filter {
   void move(double clock, double length, unsigned steps);
   unsigned steps_for(double length) const;
   void weigh(const ObservationWindow& window, std::span<const double> y, double clock);
-  /// Returns what ComponentConditioning calls the departure, if components are still too wide, or 0.
-  double split_and_weigh(std::span<const double> y, double clock);
-  Eigen::MatrixXd informed(std::span<const double> y, double clock, const MixtureMoments& predicted,
-                           const MixtureMoments& law, double kappa);
+  /// Returns what ComponentUpdate::condition does.
+  double take_in(std::span<const double> y, double clock, std::size_t nodes);
   void check_reach(const ObservationWindow& window, std::span<const double> y, double clock);
   void check_bounds(double time);
   void warn(WarningKind kind, double time, std::string text);
@@ -68,7 +66,7 @@ class ComponentFilter final : public Filter {
   double kappa_;
   ThreadPool threads_;
   MomentEquations equations_;
-  std::optional<ComponentConditioning> conditioning_;
+  std::optional<ComponentUpdate> update_;
   std::optional<LinearGaussianModel> affine_;
   LinearTransition transition_;
   double transition_length_ = -1;

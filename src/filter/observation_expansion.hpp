@@ -39,6 +39,8 @@ class ObservationExpansion {
   const AffineSensor* affine_sensor() const { return sensor_; }
   const std::vector<double>& gaussian_variances() const { return variances_; }
   bool additive() const { return additive_; }
+  /// Of additive noise: the density falls by e^{-1/2} over so much.
+  const std::vector<double>& scales() const { return scale_; }
 
  private:
   void expand_additive(std::span<const double> y, ConstBatchView x, BatchView gradient, BatchView curvature,
