@@ -366,7 +366,7 @@ void ComponentFilter::weigh(const ObservationWindow& window, std::span<const dou
 
 // Divides what the likelihood calls for, and conditions.
 double ComponentFilter::take_in(std::span<const double> y, double clock, std::size_t nodes) {
-  const ComponentUpdate::Limits limits{0.5 * options_.substep_tolerance, (d_ == 2 ? 24 : 8) * nodes};
+  const ComponentUpdate::Limits limits{0.25 * options_.substep_tolerance, (d_ == 2 ? 24 : 8) * nodes};
   const double left = update_->condition(y, clock, limits, components_, &threads_);
   if (components_.size() > 8 * nodes) merge_.merge(components_, 8 * nodes);
   return left;

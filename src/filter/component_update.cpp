@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "wienertree/filter/component_merge.hpp"
+#include "wienertree/filter/small_matrix.hpp"
 #include "wienertree/numeric/log_weights.hpp"
 
 namespace wienertree {
@@ -11,6 +13,7 @@ namespace {
 constexpr int most_rounds = 12;
 constexpr double spacing = 1.5, reach = 5;  // of the parts, in kappa and in standard deviations
 constexpr double negligible = 1e-4;         // worth of what is left undivided, altogether
+constexpr double most_relief = 8;           // of the spread that is allowed, for narrow components
 constexpr double lost = 1e-14;              // of the mass
 
 // Points of the lattice on each side of 0.
@@ -29,6 +32,19 @@ void append(const GaussianComponents& from, std::size_t n, GaussianComponents& t
 // What may be wrong with a component: its share of the mass times the square of the spread, at most 1. Those whose
 // modes may hide have the share that their own points guess.
 void ComponentUpdate::choose(const GaussianComponents& c, double log_mass, const Limits& limits) {
+  // Where nothing has a likelihood yet there is no law to compare with.
+  const bool known = std::isfinite(log_mass);
+  GaussianComponents all;
+  if (known) {
+    all.reshape(c.states(), accepted_.size() + c.size());
+    for (std::size_t n = 0; n < accepted_.size(); ++n) append(accepted_, n, all, n);
+    for (std::size_t n = 0; n < c.size(); ++n) append(c, n, all, accepted_.size() + n);
+    ComponentMerge::drop_negligible(all, lost);
+  }
+  const Eigen::MatrixXd S = known ? moments(all).covariance
+                                  : Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(c.states()),
+                                                          static_cast<Eigen::Index>(c.states()));
+  const Whitening<Eigen::Dynamic> law{SmallSquare<Eigen::Dynamic>(S)};
   const ComponentConditioning::Reading& reading = conditioning_.reading();
   divisions_.clear();
   const double least = negligible / static_cast<double>(std::max<std::size_t>(c.size(), 100));
@@ -39,8 +55,13 @@ void ComponentUpdate::choose(const GaussianComponents& c, double log_mass, const
     if (!std::isfinite(share)) share = 0;
     if (hides) share = std::max(share, std::min(1.0, std::exp(reading.guess[n] - log_mass)));
     const double worth = share * (hides ? 1.0 : std::min(1.0, spread * spread));
-    if (!(worth > least) || !(hides || spread > limits.spread)) continue;
-    const double part = hides ? 0.25 : std::clamp(limits.spread / spread, 1.0 / 16, 0.5);
+    const double variance =  // along the axis, after the observation, over that of the law
+        known ? reading.narrowing[n] *
+                    (law.whitening * vector_of<Eigen::Dynamic>(reading.axis, c.states(), n)).squaredNorm()
+              : 1.0;
+    const double allowed = limits.spread * std::clamp(1 / variance, 1.0, most_relief);
+    if (!(worth > least) || !(hides || spread > allowed)) continue;
+    const double part = hides ? 0.25 : std::clamp(allowed / spread, 1.0 / 16, 0.5);
     const double kappa = std::sqrt(std::max(1.0 / 400, part * reading.narrowing[n]));
     divisions_.push_back({n, kappa, worth, static_cast<std::size_t>(2 * lattice_reach(kappa) + 1)});
   }
@@ -135,7 +156,7 @@ double ComponentUpdate::condition(std::span<const double> y, double clock, const
     squares += w * spread_[n] * spread_[n];
   }
   const double left = std::sqrt(squares / mass);
-  return left > 2 * limits.spread ? left : 0;
+  return left > 2 * most_relief * limits.spread ? left : 0;
 }
 
 }  // namespace wienertree

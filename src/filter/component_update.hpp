@@ -15,14 +15,16 @@ namespace wienertree {
 /// u_j equidistant, 1.5 kappa apart, w_j proportional to exp(-u_j^2/2): the density ripples by
 /// 2 exp(-2 pi^2/1.5^2) = 3e-4 of itself. kappa^2 is that part of the variance v^T (1 + A)^{-1} v that the observation
 /// leaves which brings the spread, quadratic in it at least, to the tolerance, between 1/16 and 1/2 of it, or 1/4 where
-/// a mode may hide.
+/// a mode may hide. The tolerance for the spread is that for a component as wide as the law; for one whose variance is
+/// the part f of the law's it is 1/f times that, and eight times at most: what a narrow component lacks in skewness the
+/// law does not show.
 class ComponentUpdate {
  public:
   /// The model must outlive it.
   explicit ComponentUpdate(const Model& model) : conditioning_(model) {}
 
   struct Limits {
-    double spread = 0.05;           ///< of the log ratio, in a component that counts
+    double spread = 0.05;  ///< of the log ratio, in a component that counts and is as wide as the law
     std::size_t components = 3200;  ///< that are divided in one round, counted as their parts
   };
   /// @return the root mean square of the spread, weighted by what components are worth after the observation, if that

@@ -14,7 +14,7 @@
 namespace wienertree {
 namespace {
 
-constexpr std::size_t most_gaussians = 512;
+constexpr std::size_t most_gaussians = 512, width_classes = 16;
 
 // h/S for so many families in so many dimensions. On the line the recommended 60 nodes lie regularly; in the plane and in
 // space patches of the recommended 300 and 600 leave lumps as wide as they are. The width falls with the number, so
@@ -256,12 +256,17 @@ void Marginal::merge(std::vector<Family>& families) {
   for (const Family& f : families) mean += f.weight * f.mean;
   for (const Family& f : families) second += f.weight * (f.variance + (f.mean - mean) * (f.mean - mean));
   const double low = mean - 8 * std::sqrt(second), width = 16 * std::sqrt(second) / most_gaussians;
-  std::vector<Family> cells(most_gaussians, {0, 0, 0});
+  std::vector<Family> cells(most_gaussians * width_classes, {0, 0, 0});
   for (const Family& f : families) {
     const double position = width > 0 && std::isfinite(width) && std::isfinite(f.mean)
                                 ? std::clamp((f.mean - low) / width, 0.0, most_gaussians - 1.0)
                                 : 0.0;
-    Family& cell = cells[static_cast<std::size_t>(position)];
+    // Classes of a factor 2 in variance, down to 2^-15 of the whole law's.
+    const double halvings =
+        f.variance > 0 && second > 0 ? std::log2(second / f.variance) : width_classes - 1.0;
+    const double width_class = std::clamp(std::floor(halvings), 0.0, width_classes - 1.0);
+    Family& cell =
+        cells[static_cast<std::size_t>(width_class) * most_gaussians + static_cast<std::size_t>(position)];
     cell.weight += f.weight;
     cell.mean += f.weight * (f.mean - mean);
     cell.variance += f.weight * (f.variance + (f.mean - mean) * (f.mean - mean));
@@ -272,6 +277,7 @@ void Marginal::merge(std::vector<Family>& families) {
     cell.variance = std::max(0.0, cell.variance / cell.weight - cell.mean * cell.mean);
     cell.mean += mean;
   }
+  std::erase_if(cells, [](const Family& cell) { return !(cell.weight > 0); });
   families.swap(cells);
 }
 

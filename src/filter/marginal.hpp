@@ -22,7 +22,8 @@ namespace wienertree {
 /// (x_(n), w_(1) + .. + w_(n-1) + w_(n)/2) and to be linear between.
 ///
 /// More than 512 Gaussians are merged, mean and variance kept, into as many cells over the mean +- 8 standard
-/// deviations: a cell is then 1/32 standard deviation wide.
+/// deviations for each factor of 2 in variance: a cell is then 1/32 standard deviation wide, and narrow Gaussians are not
+/// mixed with wide ones.
 class Marginal {
  public:
   /// Component i. @pre i < posterior.points.components()
