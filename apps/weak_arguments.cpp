@@ -194,7 +194,6 @@ void use_exact_transition(const WeakArguments& a, WeakProblem& problem) {
       problem.transition = std::make_shared<JacobiTransition>(*jacobi);
     return;
   }
-  if (structure->price && a.horizons.size() > 1) return;  // it is integrated out at one time
   if (!structure->price) {
     SquareRootStructure own = *structure;
     own.nonnegative_integrals = false;
@@ -203,10 +202,13 @@ void use_exact_transition(const WeakArguments& a, WeakProblem& problem) {
   }
   const ConditionalPrice price(*structure, problem.source.model().initial);
   for (std::size_t i = 0; i < problem.kinked.size(); ++i) {
-    KinkedFunction smooth;
     const KinkedFunction& f = problem.kinked[i];
-    smooth.exact = !problem.discount_state ? price.average_of_rest(f.exact, f.kinks, a.horizon())
-                                           : price.average(f.exact, f.kinks, a.horizon());
+    std::vector<BatchFunction>& times = problem.by_time.emplace_back();
+    for (const double T : a.horizons)
+      times.push_back(problem.discount_state ? price.average(f.exact, f.kinks, T)
+                                             : price.average_of_rest(f.exact, f.kinks, T));
+    KinkedFunction smooth;
+    smooth.exact = times.back();
     problem.kinked[i] = std::move(smooth);
   }
   if (problem.discount_state) problem.discount_state = price.place(*problem.discount_state);
@@ -239,7 +241,7 @@ WeakProblem weak_problem(const WeakArguments& a, const TextModel& model) {
     model.compile(expression, "--average");  // for the place of a mistake in it
     integrals.push_back({name, fmt::format("({})/({:.17g})", expression, a.horizon()), "--average"});
   }
-  WeakProblem problem{model, {}, a.payoffs, {}, {}, {}, 0, {}, {}};
+  WeakProblem problem{model, {}, a.payoffs, {}, {}, {}, {}, 0, {}, {}};
   if (a.discount) {
     if (const auto constant = model.constant(*a.discount, "--discount")) {
       problem.discount_rate = *constant;
@@ -277,6 +279,7 @@ std::vector<std::vector<WeakPayoff>> averaged_payoffs(const WeakArguments& a, co
       else
         payoffs.emplace_back(f.exact);
       payoffs.back().discount_rate = problem.discount_rate;
+      if (!problem.by_time.empty()) payoffs.back().at_times = problem.by_time[i];
     }
   }
   return averaged;

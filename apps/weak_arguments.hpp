@@ -46,12 +46,14 @@ void add_weak_options(CLI::App& app, WeakArguments& arguments);
 
 /// A model and what is to be averaged at its horizon.
 struct WeakProblem {
-  TextModel source;                                  ///< the model with its added states
-  std::vector<std::string> added;                    ///< names of these
-  std::vector<std::string> payoffs;                  ///< as given
-  std::vector<KinkedFunction> kinked;                ///< one a payoff
-  std::vector<KinkTreatment> treatment;              ///< one a payoff; sharp where there are no kinks
-  std::vector<std::vector<KinkScale>> scales;        ///< of the kinks of payoffs that a kernel smooths
+  TextModel source;                            ///< the model with its added states
+  std::vector<std::string> added;              ///< names of these
+  std::vector<std::string> payoffs;            ///< as given
+  std::vector<KinkedFunction> kinked;          ///< one a payoff
+  std::vector<KinkTreatment> treatment;        ///< one a payoff; sharp where there are no kinks
+  std::vector<std::vector<KinkScale>> scales;  ///< of the kinks of payoffs that a kernel smooths
+  /// By payoff and time where a price is integrated out, whose law given the variances depends on the time; else empty.
+  std::vector<std::vector<BatchFunction>> by_time;
   double discount_rate = 0;                          ///< where it is constant
   std::optional<std::size_t> discount_state;         ///< where it is not
   std::shared_ptr<const TransitionRule> transition;  ///< null: the paths of a formula

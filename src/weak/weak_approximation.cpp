@@ -39,6 +39,7 @@ class WeakTree {
     by_width_ = options.thinning.method == ThinningMethod::recombination;
     on_a_line_ = by_width_ && options.patch_width > 0 && dimensions == 1;
     for (const WeakPayoff& payoff : payoffs) kinks_ = kinks_ || !payoff.function.kinks.empty();
+    by_time_ = std::all_of(payoffs.begin(), payoffs.end(), [](const auto& f) { return !f.at_times.empty(); });
     two_steps_ = kinks_ && options.formula.degree <= 5 && options.formula.paths.size() <= 16;
     drift_increments_.assign(1 + model.noise_dimension(), 0.0);
     for (const CubaturePath& path : options.formula.paths) log_lambda_.push_back(std::log(path.weight));
@@ -106,11 +107,14 @@ class WeakTree {
   // Averages over leaves at the end of step j, in families of the nodes `parents` of one generation.
   void report(std::size_t j, const Generation& leaves, std::size_t parents) {
     estimate_.leaves = leaves.size();
+    const std::size_t time = estimate_.value.size() / payoffs_.size();
     std::optional<FamilyAverage> families;
     for (std::size_t i = 0; i < payoffs_.size(); ++i) {
       const KinkedFunction& f = payoffs_[i].function;
       LeafAverage average;
-      if (f.kinks.empty() || parents == 0) {
+      if (!payoffs_[i].at_times.empty()) {
+        average = average_over(payoffs_[i].at_times[time], leaves);
+      } else if (f.kinks.empty() || parents == 0) {
         average = average_over(f.exact, leaves);
       } else {
         if (!families) families.emplace(leaves, parents, options_.formula.degree >= 7);
@@ -186,14 +190,16 @@ class WeakTree {
     require_success(j);
     settle(children_, j);
     const std::size_t parents = nodes_.size();
-    if (reports(j) && !(two_steps_ && j > 1)) report(j, children_, parents);
+    // Payoffs with a price integrated out are smooth, and cost more than a step: they see what thinning leaves.
+    const bool thinned_first = reports(j) && by_time_ && pruned_ && children_.size() > options_.nodes;
+    if (reports(j) && !thinned_first && !(two_steps_ && j > 1)) report(j, children_, parents);
     if (two_steps_ && j + 1 < options_.grid.size() && reports(j + 1)) {
       move(children_, length(j + 1), grandchildren_, failures_);
       require_success(j + 1);
       settle(grandchildren_, j + 1);
       report(j + 1, grandchildren_, parents);
     }
-    if (keep_all) {
+    if (keep_all && !thinned_first) {
       std::swap(nodes_, children_);
       return;
     }
@@ -210,6 +216,7 @@ class WeakTree {
     }
     select(children_, selection_, nodes_, &grower_.threads());
     discarded_ += selection_.discarded;
+    if (thinned_first) report(j, nodes_, 0);
   }
 
   // The value at T of what thinning is finest along, each child moved by the drift V_0 alone. It only decides
@@ -249,6 +256,7 @@ class WeakTree {
   const WeakOptions& options_;
   bool pruned_, by_weight_alone_;
   bool kinks_ = false;      ///< some payoff has them
+  bool by_time_ = false;    ///< all have a function for each time
   bool two_steps_ = false;  ///< families are those of the last two steps
   bool on_a_line_ = false;  ///< patches have a given width, whatever the budget
   bool by_width_ = false;   ///< thinning looks at local standard deviations
@@ -284,6 +292,11 @@ WeakEstimate weak_approximation(const Model& model, const Generation& start,
     throw InputError(fmt::format("is not one of {} states", model.state_dimension()), "discount_state",
                      std::to_string(*options.discount_state));
   if (options.nodes == 0) throw InputError("must be at least 1", "nodes", "0");
+  for (const WeakPayoff& payoff : payoffs)
+    if (!payoff.at_times.empty() &&
+        payoff.at_times.size() != std::max<std::size_t>(1, options.report_at.size()))
+      throw InputError("needs a function for each time to report at", "payoff",
+                       std::to_string(payoff.at_times.size()));
   if (options.transition && options.thinning.order == SiteOrder::tree && !recombines(options.thinning.method))
     throw InputError("needs a thinning that looks at states", "transition");
   if (options.thinning.method == ThinningMethod::none)

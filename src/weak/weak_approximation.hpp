@@ -28,6 +28,8 @@ class WeakJournal;
 struct WeakPayoff {
   KinkedFunction function;
   double discount_rate = 0;  ///< values are multiplied by exp(-discount_rate t)
+  /// One for each time to report at, instead of `function`, where it is not the same at all times; or empty.
+  std::vector<BatchFunction> at_times = {};
 
   template <class F>
   requires std::constructible_from<BatchFunction, F> WeakPayoff(F smooth)

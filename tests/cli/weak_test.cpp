@@ -227,6 +227,12 @@ TEST_CASE("weak: several horizons and payoffs from one tree") {
   REQUIRE(chosen.size() == 4);
   CHECK(std::abs(chosen[0]["value"].get<double>() - call[0]) < chosen[0]["error"].get<double>());
   CHECK(std::abs(chosen[2]["value"].get<double>() - call[2]) < chosen[2]["error"].get<double>());
+  // Heston (1993), by Lewis' integral: the exact transition at every time.
+  const auto strip = rows_of(place, "heston --horizon 0.25,0.5,1 --payoff max(s-1,0) --tolerance 1e-6");
+  const double heston[] = {0.06661057729125, 0.09868949267712, 0.14945225829085};
+  for (std::size_t i = 0; i < 3; ++i)
+    CHECK(std::abs(strip[i]["value"].get<double>() - heston[i]) < strip[i]["error"].get<double>());
+  CHECK(strip[2]["error"].get<double>() < 1e-6);
   CHECK(place.run("weak gbm --horizon 1,0.5 --steps 4 --payoff s").code == 2);
   CHECK(place.run("weak gbm --horizon 0.5,1 --steps 4 --average s --payoff average_s").code == 2);
 }
