@@ -10,9 +10,10 @@ namespace wienertree {
 
 namespace {
 
-constexpr double reach = 8.5;       // standard deviations; 2e-17 of the mass lie beyond
-constexpr int cells = 34;           // between -reach and reach, in which kinks are looked for
-constexpr double widest_panel = 2;  // 12 nodes on it integrate phi(z) exp(S z), S up to 3, to rounding
+constexpr double reach = 8.5;  // standard deviations; 2e-17 of the mass lie beyond
+constexpr int cells = 34;      // between -reach and reach, in which kinks are looked for
+// 12 nodes on a panel of width 2 integrate phi(z) exp(S z), S up to 3, to rounding; on one of 3.4, S up to 1, to 1e-13.
+constexpr double narrow_panel = 2, wide_panel = 3.4;
 constexpr std::size_t leaves_at_once = 64;
 
 // Gauss-Legendre, 12 nodes, the positive half (Abramowitz, Stegun 1964, table 25.4).
@@ -160,10 +161,11 @@ class Average {
       points_.push_back({n, 0.0, 1.0});
       return;
     }
+    const double widest = law_[n].deviation <= 1 ? wide_panel : narrow_panel;
     double left = -reach;
     for (std::size_t i = 0; i <= breaks_[n].size(); ++i) {
       const double right = i < breaks_[n].size() ? breaks_[n][i] : reach;
-      const double panels = std::ceil((right - left) / widest_panel), half = (right - left) / panels / 2;
+      const double panels = std::ceil((right - left) / widest), half = (right - left) / panels / 2;
       for (double panel = 0; panel < panels; ++panel)
         for (std::size_t k = 0; k < legendre_node.size(); ++k)
           for (const double side : {-1.0, 1.0}) {
