@@ -16,9 +16,12 @@ namespace {
 
 constexpr double negligible = 1e-14;  // of the largest weight
 
-// A tilt towards a likelihood that is no Gaussian leads to twice the posterior's covariance: wider than each mode and
-// than the shoulders of a heavy tail, at the price of twice the area in two dimensions.
-constexpr double posterior_widening = 2;
+// A tilt towards a likelihood that is no Gaussian leads to twice the posterior's covariance or more: wider than each mode
+// and than the shoulders of a heavy tail, at the price of twice the area in two dimensions. What it does to modes of
+// little weight far away is not seen by runs that all have it: it is weakened as tolerances fall, and left out where they
+// are above the default, which the coarsest run of the control of accuracy has.
+constexpr double default_tolerance = 0.1;
+double posterior_widening(double tolerance) { return 2 * default_tolerance / tolerance; }
 
 // Departure of a component from Gaussian over a substep, in units of FilterOptions::substep_tolerance. Merging, once
 // a substep, costs little in two dimensions and much in four, where patches are wide.
@@ -323,6 +326,8 @@ std::vector<Tilt> ComponentFilter::plan(const ObservationWindow& window, std::sp
   if (update_->expansion().linear_gaussian())
     return path_.plan(start, clock_, window.length(), K, steps,
                       [&](const LawMoments& reference) { return expanded_tilt(y, end, reference); });
+  const double tolerance = options_.substep_tolerance;
+  if (tolerance > 1.001 * default_tolerance) return std::vector<Tilt>(K + 1, Tilt::none(d_));
   const GaussianComponents before = components_;
   const std::size_t nodes = std::max<std::size_t>(60, options_.nodes / 4);
   substeps(std::vector<Tilt>(K + 1, Tilt::none(d_)), window.length(), steps, nodes);
@@ -332,7 +337,7 @@ std::vector<Tilt> ComponentFilter::plan(const ObservationWindow& window, std::sp
   pilot_evidence_ = posterior.log_mass;
   components_ = before;
   const Tilt last = tilt_between({predicted.mean, predicted.covariance},
-                                 {posterior.mean, posterior_widening * posterior.covariance});
+                                 {posterior.mean, posterior_widening(tolerance) * posterior.covariance});
   return path_.plan(start, clock_, window.length(), K, steps, [&](const LawMoments&) { return last; });
 }
 

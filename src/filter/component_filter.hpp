@@ -23,8 +23,9 @@ namespace wienertree {
 ///
 /// A linear sensor with Gaussian noise gives the tilt itself. For any other likelihood, which may have several modes
 /// or heavy tails, a smaller filter without a tilt crosses the gap first, and the tilt is the Gaussian that leads from
-/// the moments of its prediction to the mean and twice the covariance of its posterior: it covers all modes, and none
-/// of them is lost. Where both filters disagree by more than .5 in log evidence a warning says so.
+/// the moments of its prediction to the mean and twice the covariance of its posterior, or more where the tolerance of
+/// substeps is smaller than the default; with a larger tolerance there is no tilt. Where both filters disagree by more
+/// than .5 in log evidence a warning says so.
 ///
 /// Components too wide for the likelihood are divided where they are conditioned (component_update.hpp).
 class ComponentFilter final : public Filter {
