@@ -50,9 +50,9 @@ class FamilyLaw {
 
   std::vector<double> log_weight_, mean_, sd_, a_, c_, d_, mu_, s_;
   std::vector<std::uint64_t> first_ = {0};  ///< of each family's numbers; one more than families
-  std::vector<std::uint8_t> table_;   ///< whether they are a table, or else coefficients
-  std::vector<double> numbers_;       ///< c_0 .. c_{n-1}, or z, below, density
-  std::vector<double> weight_;        ///< of sum 1
+  std::vector<std::uint8_t> table_;         ///< whether they are a table, or else coefficients
+  std::vector<double> numbers_;             ///< c_0 .. c_{n-1}, or z, below, density
+  std::vector<double> weight_;              ///< of sum 1
   double low_ = 0, high_ = 0, centre_ = 0, width_ = 0;
   bool points_ = false;
 };
