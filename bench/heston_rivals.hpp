@@ -1,5 +1,5 @@
 #pragma once
-/// Monte Carlo for a European call in Heston's model, as others do it.
+/// A European call in Heston's model, as others price it.
 #include <cstddef>
 #include <cstdint>
 
@@ -7,9 +7,10 @@ namespace wienertree::bench {
 
 /// dS = r S dt + sqrt(v) S dB^1, dv = kappa (theta - v) dt + xi sqrt(v) (rho dB^1 + sqrt(1 - rho^2) dB^2).
 struct HestonCall {
-  double s0 = 100, strike = 100, r = 0, v0 = 0.04, kappa = 2, theta = 0.04, xi = 0.3, rho = -0.7, horizon = 1;
-  /// By Fourier inversion, for the values above.
-  static constexpr double exact = 7.6157469179;
+  double s0 = 100, strike = 105, r = 0.02, v0 = 0.04, kappa = 1.5, theta = 0.05, xi = 0.4, rho = -0.5;
+  double horizon = 274.0 / 365;  ///< whole days, for QuantLib's dates
+  /// Undiscounted, by Lewis' integral, for the values above.
+  static constexpr double exact = 5.2236711962;
 };
 
 struct MonteCarloResult {
@@ -20,5 +21,13 @@ struct MonteCarloResult {
 /// discretisation (quadratic exponential with martingale correction: Andersen 2008).
 MonteCarloResult quantlib_heston(const HestonCall& call, std::size_t steps, std::size_t paths,
                                  std::uint64_t seed);
+
+/// The same engine driven by Sobol numbers (LowDiscrepancy). No standard error: 0.
+MonteCarloResult quantlib_heston_sobol(const HestonCall& call, std::size_t steps, std::size_t paths);
+
+/// QuantLib's FdHestonVanillaEngine in its default scheme (Hundsdorfer), on a grid of `time` steps, `price` by
+/// `variance` points; undiscounted. Standard error 0.
+MonteCarloResult quantlib_heston_fd(const HestonCall& call, std::size_t time, std::size_t price,
+                                    std::size_t variance);
 
 }  // namespace wienertree::bench
