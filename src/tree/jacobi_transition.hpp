@@ -11,6 +11,8 @@
 ///
 /// Gauss's rule of q nodes reproduces 2q of them for every start and all parameters; its nodes lie in
 /// [lower, upper], whether or not the process reaches the bounds. Weak order q - 1.
+#include <array>
+
 #include "wienertree/model/jacobi.hpp"
 #include "wienertree/tree/transition.hpp"
 
