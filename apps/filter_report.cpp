@@ -12,12 +12,6 @@
 namespace wienertree::app {
 namespace {
 
-// The functional that the data allowed.
-std::string functional_in_force(const FilterContext& c, const FilterRun& run) {
-  const std::string asked = options_in_force(run.setup, c.model).value("functional", "");
-  return asked == "second-order" && run.statistics.steps + 1 >= c.windows.rows() ? "trapezoid" : asked;
-}
-
 std::string line_of_numbers(const std::string& name, std::span<const double> numbers) {
   std::string line = fmt::format("  {:<22}", name);
   for (const double number : numbers) line += fmt::format(" {:>12.6g}", number);
@@ -37,8 +31,6 @@ std::string what_was_run(const FilterContext& c, const FilterRun& run) {
   for (const auto& [name, value] : options.items()) {
     const std::string shown = value.is_string() ? value.get<std::string>() : value.dump();
     text += fmt::format("{}{} {}", separator, name, shown);
-    if (name == "functional" && functional_in_force(c, run) != shown)
-      text += fmt::format(" (as {}: no rows inside the steps)", functional_in_force(c, run));
     separator = ", ";
   }
   return text + '\n';
@@ -124,8 +116,6 @@ Json filter_report(const FilterContext& c, const FilterRun& run) {
   options["work"] = c.control.work;
   if (c.highest_moment > 0) options["moments"] = c.highest_moment;
   report["options"] = std::move(options);
-  if (c.model.observation == ObservationKind::continuous && keeps_nodes(c.setup.options.method))
-    report["functional_in_force"] = functional_in_force(c, run);
   report["children"] = run.statistics.children;
   report["ode_solves"] = run.statistics.flow.node_segments;
   if (run.error_known) {

@@ -44,7 +44,6 @@ class StandardInputWindows final : InputStream, public WindowSource {
   std::optional<double> end() const override { return windows_->end(); }
   std::size_t size() const override { return windows_->size(); }
   std::size_t rows() const override { return windows_->rows(); }
-  bool has_inner_rows() const override { return windows_->has_inner_rows(); }
   bool streams() const override { return windows_->streams(); }
   std::string identity() const override { return windows_->identity(); }
   void exchange(StateArchive& archive) override { windows_->exchange(archive); }

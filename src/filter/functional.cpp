@@ -44,7 +44,7 @@ class LinearInterpolation : public Functional {
       const double* h = h0.component(i).data();
       for (std::size_t n = 0; n < out.size(); ++n) out[n] += h[n] * (a - s / 6 * h[n]);
     }
-    if (!adds_remainder(window)) return;
+    if (!second_order_) return;
     for_pairs(window, h0.components(), G, out.size(),
               [&](const Pair& c, const double* gg, std::size_t first, std::size_t count) {
                 const double *a = h0.component(c.i).data() + first, *b = h0.component(c.l).data() + first;
@@ -64,7 +64,7 @@ class LinearInterpolation : public Functional {
       const double* q = h1.component(i).data();
       for (std::size_t n = 0; n < log_weight.size(); ++n) log_weight[n] += q[n] * (b - s / 6 * (p[n] + q[n]));
     }
-    if (!adds_remainder(window)) return;
+    if (!second_order_) return;
     for_pairs(window, h0.components(), G, log_weight.size(),
               [&](const Pair& c, const double* gg, std::size_t first, std::size_t count) {
                 const double *a = h0.component(c.i).data() + first, *b = h0.component(c.l).data() + first;
@@ -81,8 +81,6 @@ class LinearInterpolation : public Functional {
   double slope(const ObservationWindow& window, std::size_t i) const {
     return second_order_ ? window.integral[i] / window.length() : window.increment[i] / 2;
   }
-
-  bool adds_remainder(const ObservationWindow& window) const { return second_order_ && window.rows() > 2; }
 
   // What multiplies theta (G G^T)_il, off the diagonal for (i,l) and (l,i) together.
   struct Pair {

@@ -23,7 +23,8 @@ namespace wienertree {
 /// from h_0 to h_1 and b a Brownian bridge. That mean is
 ///     exp(int l.dY - 1/2 int |l|^2 + 1/2 Var(int (G b).(dY - l du)) - 1/2 int E|G b|^2)
 /// up to terms of fourth degree in s: C, c and R are the covariances of int b dY and int b l du, and
-/// s^2/6 = int E b^2. Where h is linear and G constant its local error is O(s^4); else terms of curvature,
+/// s^2/6 = int E b^2; the bridge in C turns the likelihood of a path that is linear between rows into that of its
+/// increments. Where h is linear and G constant its local error is O(s^4); else terms of curvature,
 /// O(s^{5/2}) and random in sign, remain, and the order is 2. The exact mean has K (1 + G^T G K)^{-1} in place
 /// of the covariance operator K of b: theta, with K's largest eigenvalue s^2/pi^2, changes log w by O(s^4) and
 /// keeps it from growing with |h| when |G| s is large.

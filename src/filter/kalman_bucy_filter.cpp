@@ -48,8 +48,9 @@ void KalmanBucyFilter::advance(const ObservationWindow& window) {
       increment_ = (row(r + 1) - row(r)) / length;
       pass_gap(length, increment_);
     }
-  else
-    pass_gap(window.length(), increment_);
+  // What the increments' likelihood has beyond that of the path that is linear between rows.
+  if (observed_) log_evidence_ += (model_.H * model_.Q * model_.H.transpose()).trace() * window.bridge / 2;
+  if (!observed_) pass_gap(window.length(), increment_);
   posterior_.time = window.end;
   ++statistics_.steps;
 }

@@ -221,6 +221,7 @@ const Posterior& KlvFilter::posterior() {
   posterior_.points = current_->states;
   posterior_.weight = normalised_.weight;
   posterior_.parents = current_ == &children_ ? children_.size() / options_.formula.paths.size() : 0;
+  posterior_.bounds = model_.bounds;
   posterior_.kept = survivors_.size();
   if (fresh && model_.observation != ObservationKind::none)
     warn_of_law(model_, posterior_, normalised_.effective_size, warnings_);

@@ -50,6 +50,19 @@ double distribution_term(double z, double rho) {
   return z * (rho / 2 - rho * rho / 8 * (q - 3) + rho * rho * rho / 48 * (q * q - 10 * q + 15));
 }
 
+// He_k(z), k = 2..5.
+struct Hermite {
+  explicit Hermite(double z)
+      : second(z * z - 1),
+        third(z * second - 2 * z),
+        fourth(z * third - 3 * second),
+        fifth(z * fourth - 4 * third) {}
+  double second, third, fourth, fifth;
+};
+
+// As many families as tell no more than moments.
+std::size_t few_families(std::size_t dimension) { return dimension == 1 ? 12 : dimension == 2 ? 50 : 200; }
+
 double normal_distribution(double z) { return 0.5 * std::erfc(-z / std::numbers::sqrt2); }
 double normal_density(double z) { return std::exp(-z * z / 2) / std::sqrt(2 * std::numbers::pi); }
 
@@ -186,8 +199,36 @@ Marginal::Marginal(const Posterior& posterior, std::size_t i)
     gaussians_.push_back({f.weight, f.mean, std::sqrt(f.variance)});
     if (!(f.variance > 0)) points += f.weight;
   }
-  if (posterior.dirac()) smooth(kernel_width(varying(posterior.points), posterior.parents));
-  has_density_ = !gaussians_.empty() && (points < 1e-12 || gaussians_.front().kernel > 0);
+  if (i < posterior.bounds.size()) bounds_ = posterior.bounds[i];
+  if (posterior.dirac()) {
+    const std::size_t dimension = varying(posterior.points);
+    if (posterior.parents > few_families(dimension) || !expand(families))
+      smooth(kernel_width(dimension, posterior.parents));
+  }
+  has_density_ = !gaussians_.empty() && (points < 1e-12 || expanded_ || gaussians_.front().kernel > 0);
+}
+
+// One Gaussian and its expansion in place of the families, if their moments allow it.
+bool Marginal::expand(const std::vector<Family>& families) {
+  double mean = 0, variance = 0;
+  for (const Family& f : families) mean += f.weight * f.mean;
+  for (const Family& f : families) variance += f.weight * ((f.mean - mean) * (f.mean - mean) + f.variance);
+  const double sd = std::sqrt(variance);
+  if (!(sd > 0)) return false;
+  // E He_k(Z) of Z ~ N(m, 1 - v): the recursion of He_k with v in place of 1.
+  std::array<double, 3> moment{};
+  for (const Family& f : families) {
+    const double m = (f.mean - mean) / sd, v = 1 - f.variance / variance, second = m * m - v;
+    const double third = m * second - 2 * v * m, fourth = m * third - 3 * v * second;
+    moment[0] += f.weight * third;
+    moment[1] += f.weight * fourth;
+    moment[2] += f.weight * (m * fourth - 4 * v * third);
+  }
+  if (!(std::abs(moment[0]) <= 0.5 && std::abs(moment[1]) <= 0.5)) return false;
+  gaussians_.assign(1, {1, mean, sd});
+  hermite_ = {moment[0] / 6, moment[1] / 24, moment[2] / 120};
+  expanded_ = true;
+  return true;
 }
 
 void Marginal::smooth(double kernel_width) {
@@ -293,6 +334,11 @@ double Marginal::distribution(double x) const {
     sum += g.weight * normal_distribution(z);
     if (g.kernel > 0) sum += g.weight * normal_density(z) * distribution_term(z, g.kernel);
   }
+  if (expanded_) {  // phi He_k is the derivative of -phi He_{k-1}
+    const double z = (x - gaussians_.front().mean) / gaussians_.front().sd;
+    const Hermite h(z);
+    sum -= normal_density(z) * (hermite_[0] * h.second + hermite_[1] * h.third + hermite_[2] * h.fourth);
+  }
   if (gaussians_.empty())
     for (std::size_t n = 0; n < atoms_.size(); ++n) sum += atoms_[n] <= x ? weight_[n] : 0.0;
   return sum;
@@ -310,6 +356,13 @@ double Marginal::sum_of_densities(double x) const {
     if (!(g.sd > 0)) continue;
     const double z = (x - g.mean) / g.sd;
     sum += g.weight * normal_density(z) * density_factor(z, g.kernel) / g.sd;
+  }
+  if (expanded_) {
+    const Gaussian& g = gaussians_.front();
+    const double z = (x - g.mean) / g.sd;
+    const Hermite h(z);
+    sum +=
+        normal_density(z) * (hermite_[0] * h.third + hermite_[1] * h.fourth + hermite_[2] * h.fifth) / g.sd;
   }
   return sum;
 }
@@ -341,6 +394,7 @@ void Marginal::quantiles(std::span<const double> levels, std::span<double> out) 
     for (std::size_t q = 0; q < levels.size(); ++q) {
       out[q] = gaussian_quantile(levels[q]);
       if (gaussians_.front().kernel > 0) out[q] = std::clamp(out[q], lowest_, highest_);
+      out[q] = std::clamp(out[q], bounds_.lower, bounds_.upper);
     }
     return;
   }

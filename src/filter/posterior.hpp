@@ -4,6 +4,7 @@
 #include <span>
 #include <vector>
 
+#include "wienertree/model/model.hpp"
 #include "wienertree/numeric/batch.hpp"
 #include "wienertree/numeric/state_archive.hpp"
 
@@ -21,6 +22,7 @@ struct Posterior {
   /// Dirac masses that are the children of so many parents, branch after branch: node n is a child of parent
   /// n % parents. 0 where nodes have no parents. Marginal spreads each family.
   std::size_t parents = 0;
+  std::span<const StateBound> bounds;  ///< d, of the states of families; or none
   std::size_t kept = 0;  ///< distinct nodes that thinning kept for the next step; N where nothing is thinned
 
   /// The law of the first component to more than its mean and variance, where the filter knows it, or null.

@@ -98,19 +98,18 @@ WIENERTREE_CLONES double row_products(const double* t, const double* a, const do
 }
 
 WIENERTREE_CLONES double row_bridge_variance(const double* t, std::size_t gaps) {
-  double total[2];
+  double total[1];
   sum_gaps(
       gaps,
-      [&]<class V>(std::size_t r, V(&sums)[2]) __attribute__((always_inline)) {
+      [&]<class V>(std::size_t r, V(&sums)[1]) __attribute__((always_inline)) {
         V u, v;
         load(t, 1, r, u);
         load(t, 1, r + 1, v);
-        const V delta = v - u, square = delta * delta;
-        sums[0] += square;
-        sums[1] += square * delta;
+        const V delta = v - u;
+        sums[0] += delta * delta;
       },
       total);
-  return total[0] / 6 - total[1] / (12 * (t[gaps] - t[0]));
+  return total[0] / 6;
 }
 
 }  // namespace wienertree

@@ -14,8 +14,7 @@ RowIntegrals row_integrals(const double* t, const double* y, std::size_t stride,
 /// int U_a U_b du for two components.
 double row_products(const double* t, const double* a, const double* b, std::size_t stride, std::size_t gaps);
 
-/// sum delta^2/6 - delta^3/(12 s) over the gaps, s = sum delta: what the variance of a Brownian bridge on
-/// each gap adds to the mean of int U^2 du - (int U du)^2 / s.
+/// sum delta^2/6 over the gaps: the integral of the variance of a Brownian bridge on each.
 double row_bridge_variance(const double* t, std::size_t gaps);
 
 }  // namespace wienertree

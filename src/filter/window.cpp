@@ -81,8 +81,9 @@ ObservationWindows::ObservationWindows(ObservationRows path, ObservationKind kin
   }
 }
 
-ObservationWindows::ObservationWindows(ObservationRows path, std::span<const std::size_t> boundaries)
-    : rows_(path), kind_(ObservationKind::continuous) {
+ObservationWindows::ObservationWindows(ObservationRows path, std::span<const std::size_t> boundaries,
+                                       bool linear)
+    : rows_(path), kind_(ObservationKind::continuous), linear_(linear) {
   for (std::size_t j = 1; j < boundaries.size(); ++j)
     windows_.push_back({path.times[boundaries[j - 1]], path.times[boundaries[j]], boundaries[j - 1],
                         boundaries[j], false, false});
@@ -97,7 +98,7 @@ void ObservationWindows::get(std::size_t j, ObservationWindow& out) const {
     const std::size_t rows = w.last_row - w.first_row + 1, k = rows_.dimension;
     out.row_times = {rows_.times.data() + w.first_row, rows};
     out.row_values = {rows_.values.data() + w.first_row * k, rows * k};
-    integrate_rows(out, k);
+    integrate_rows(out, k, linear_);
   } else {
     out.at_start = w.at_start;
     out.observation.clear();
@@ -105,34 +106,26 @@ void ObservationWindows::get(std::size_t j, ObservationWindow& out) const {
   }
 }
 
-void integrate_rows(ObservationWindow& window, std::size_t k) {
+void integrate_rows(ObservationWindow& window, std::size_t k, bool linear) {
   const std::size_t gaps = window.rows() - 1;
   const double s = window.length();
   const double *t = window.row_times.data(), *y = window.row_values.data();
   for (auto* v : {&window.increment, &window.integral, &window.bridge_start, &window.bridge_end})
     v->resize(k);
   window.covariation.assign(k * k, 0.0);
-  for (std::size_t i = 0; i < k; ++i) window.increment[i] = y[gaps * k + i] - y[i];
-  if (gaps == 1) {
-    for (std::size_t i = 0; i < k; ++i) {
-      window.integral[i] = s * window.increment[i] / 2;
-      window.covariation[i * k + i] = s * s / 6;
-      window.bridge_start[i] = window.bridge_end[i] = s * s * window.increment[i] / 24;
-    }
-    return;
-  }
+  window.bridge = linear ? 0.0 : row_bridge_variance(t, gaps);
   for (std::size_t i = 0; i < k; ++i) {
+    window.increment[i] = y[gaps * k + i] - y[i];
     const RowIntegrals r = row_integrals(t, y + i, k, gaps);
     window.integral[i] = r.i0;
     window.bridge_start[i] = s / 3 * r.i0 - r.j1 + r.j2 / (2 * s);
     window.bridge_end[i] = s / 6 * r.i0 - r.j2 / (2 * s);
   }
-  const double bridge = row_bridge_variance(t, gaps);
   for (std::size_t i = 0; i < k; ++i)
     for (std::size_t l = 0; l <= i; ++l) {
       double& c = window.covariation[i * k + l];
       c = row_products(t, y + i, y + l, k, gaps) - window.integral[i] * window.integral[l] / s;
-      if (i == l) c += bridge;
+      if (i == l) c += window.bridge;
       window.covariation[l * k + i] = c;
     }
 }

@@ -16,10 +16,12 @@ namespace wienertree {
 /// int (u/s) b_u du, which are
 ///     bridge_start = (s/3) I - J_1 + J_2/(2s),   bridge_end = (s/6) I - J_2/(2s),
 ///     J_m = int (u - start)^m U_u du                                   (k each).
-/// All are conditional expectations given the rows: Y between two rows is a Brownian bridge, whose
-/// variance adds delta^2/6 Id to int U U^T and delta^3/12 Id to the covariance of I for each gap delta.
-/// Without a row strictly inside, I = sD/2 and C = (s^2/6) Id (its unconditional mean), which turns the
-/// second-order functional into the trapezoid.
+/// Y is known at the rows alone, and its likelihood is that of its increments, in which the mean of h over each gap
+/// stands: the integrals are those of the path that is linear between rows, and
+///     bridge = sum delta^2/6 over the gaps delta,  which is added to the diagonal of C.
+/// For with hbar the mean of h over a gap, the increments' log-likelihood h.D - (delta/2) |hbar|^2 exceeds that of the
+/// linear path by 1/2 int |h - hbar|^2, which is delta^2/12 |G|^2 on average for h = G b, b a Brownian motion. The path
+/// that is truly linear between rows has bridge 0.
 struct ObservationWindow {
   std::size_t step = 0;  ///< number of the step, from 1
   double start = 0, end = 0;
@@ -27,6 +29,7 @@ struct ObservationWindow {
   std::span<const double> row_times;   ///< continuous: rows of [start, end], first and last included
   std::span<const double> row_values;  ///< their values, rows x k
   std::vector<double> increment, integral, covariation, bridge_start, bridge_end;
+  double bridge = 0;  ///< time^2
 
   /// Discrete: the observation to weigh by, or empty. `at_start`: it is a function of the state at `start`
   /// (timing "previous"), else of the state at `end`. A window of length zero weighs without moving.
@@ -50,7 +53,8 @@ class ObservationWindows {
   /// (discrete), or a first row is given where timing "previous" has no earlier state
   ObservationWindows(ObservationRows rows, ObservationKind kind, ObservationTiming timing, std::size_t steps);
   /// Of a continuous record, from each of `boundaries` to the next: row numbers that increase, the first 0.
-  ObservationWindows(ObservationRows rows, std::span<const std::size_t> boundaries);
+  /// @param linear whether Y is taken to be linear between rows: bridge = 0
+  ObservationWindows(ObservationRows rows, std::span<const std::size_t> boundaries, bool linear = false);
   std::size_t size() const { return windows_.size(); }
   /// Window j = 0..size()-1; buffers of `out` are reused.
   void get(std::size_t j, ObservationWindow& out) const;
@@ -66,6 +70,7 @@ class ObservationWindows {
   };
   ObservationRows rows_;
   ObservationKind kind_;
+  bool linear_ = false;
   std::vector<Bounds> windows_;
 };
 
@@ -73,7 +78,7 @@ class ObservationWindows {
 /// @pre 1 <= n < number of times
 std::vector<std::size_t> rows_on_grid(std::span<const double> times, std::size_t n);
 
-/// Fills increment, integral and covariation of a continuous window from its rows.
-void integrate_rows(ObservationWindow& window, std::size_t dimension);
+/// Fills increment, integral, covariation and bridge of a continuous window from its rows.
+void integrate_rows(ObservationWindow& window, std::size_t dimension, bool linear = false);
 
 }  // namespace wienertree

@@ -35,31 +35,12 @@ std::vector<std::size_t> every_other(const std::vector<std::size_t>& rows) {
   return some;
 }
 
-// The record without every other row inside the windows, whose boundaries become those of the new record.
-std::shared_ptr<const ObservationPath> every_other_row(const ObservationRows& rows,
-                                                       std::vector<std::size_t>& boundaries) {
-  auto path = std::make_shared<ObservationPath>();
-  path->dimension = rows.dimension;
-  std::vector<std::size_t> kept;
-  std::size_t next = 0;
-  for (std::size_t r = 0; r < rows.rows(); ++r) {
-    const bool boundary = next < boundaries.size() && boundaries[next] == r;
-    if (!boundary && r % 2 == 1) continue;
-    if (boundary) kept.push_back(path->rows());
-    if (boundary) ++next;
-    path->append(rows.times[r], rows.row(r));
-  }
-  boundaries.swap(kept);
-  return path;
-}
-
 }  // namespace
 
 struct ControlledFilter::Plan {
   RunRole role;
   int level;
   FilterSetup setup;
-  std::shared_ptr<const ObservationPath> sparse;  ///< the rows, where they are not those of the record
   ObservationWindows windows;
 };
 
@@ -135,23 +116,21 @@ ControlledFilter::Plan ControlledFilter::plan(RunRole role, int level) const {
   const bool coarser = model_.observation == ObservationKind::continuous && output_rows_.size() > 2;
   if (role == RunRole::steps) halvings += coarser ? -1 : 1;
   if (model_.observation == ObservationKind::continuous) {
-    ObservationRows rows = rows_;
-    std::vector<std::size_t> boundaries =
+    const std::vector<std::size_t> boundaries =
         halvings < 0 ? every_other(output_rows_) : refined(rows_.times, output_rows_, halvings);
-    std::shared_ptr<const ObservationPath> sparse;
-    if (role == RunRole::rows) {
-      sparse = every_other_row(rows_, boundaries);
-      rows = *sparse;
+    bool linear = role == RunRole::rows;
+    if (linear && !closed_form() && o.functional != FunctionalMethod::second_order) {
+      o.functional = FunctionalMethod::second_order;  // knows more of the rows
+      linear = false;
     }
-    return {role, level, std::move(setup), std::move(sparse), ObservationWindows(rows, boundaries)};
+    return {role, level, std::move(setup), ObservationWindows(rows_, boundaries, linear)};
   }
   std::size_t steps = control_.steps.value_or(default_steps(rows_, model_.observation));
   if (o.conditioning != Conditioning::children && !control_.steps)
     steps = rows_.rows() - 1;  // the filter chooses its own inside
   else if (halvings > 0)
     steps <<= halvings;
-  return {role, level, std::move(setup), nullptr,
-          ObservationWindows(rows_, model_.observation, model_.timing, steps)};
+  return {role, level, std::move(setup), ObservationWindows(rows_, model_.observation, model_.timing, steps)};
 }
 
 // An unpruned tree has no room for a formula of more paths.
@@ -183,7 +162,7 @@ bool ControlledFilter::applies(RunRole role) const {
     case RunRole::degree:
       return other_formula().has_value();
     case RunRole::rows:
-      return continuous && rows_.rows() > 2 * output_rows_.size();
+      return continuous;
     case RunRole::launch_1:
     case RunRole::launch_2:
       return false;
@@ -236,11 +215,6 @@ RowErrors ControlledFilter::errors_of(int level) const {
     // quarter of the error left, which the difference lacks.
     if (role == RunRole::steps && model_.observation == ObservationKind::discrete)
       for (AnswerError& e : some) e *= 1.5;
-    // What the record's own spacing leaves open is told for the evidence, to which it matters most; moments lose
-    // with every other row what those rows knew. The evidence errs in proportion to the spacing, so that the whole
-    // difference is what is left; on records of 4000 rows it was 0.4 to 1.2 of the error, hence the half more.
-    if (role == RunRole::rows)
-      for (AnswerError& e : some) e = {0, 0, 0, 1.5 * e.log_evidence};
     // The rows of a guard with longer steps are fewer.
     if (some.size() != answer->rows.size()) {
       RowErrors all(answer->rows.size());
@@ -258,7 +232,7 @@ RowErrors ControlledFilter::errors_of(int level) const {
     errors.resize(answer->rows.size());
     for (std::size_t r = 0; r < errors.size(); ++r) {
       errors[r] += rounding_error(answer->rows[r].mean);
-      // Continuous: Riccati's equation to 1e-6 and the path's shape between rows.
+      // Continuous: Riccati's equation to 1e-6.
       if (model_.observation == ObservationKind::continuous) errors[r] += {1e-5, 1e-5, 1e-5, 1e-5};
     }
   }

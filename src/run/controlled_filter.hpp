@@ -29,7 +29,7 @@ enum class RunRole : std::uint8_t {
   steps,   ///< level, but for the number of steps, where steps are given
   nodes,   ///< level, but for half the nodes, where nodes are given
   degree,  ///< level, but for the degree m + 2 of the formula, or m - 2 where there is none
-  rows,    ///< level, but with every other row of a continuous record
+  rows,    ///< level, but with the observed path linear between rows, which is the first order of their spacing
   launch_1,  ///< random methods: a quarter of the particles, other random numbers
   launch_2,
 };
@@ -64,7 +64,7 @@ struct Accuracy {
 /// applies and once the first term is within the tolerance. Errors fall from level to level, so that the sum
 /// exceeds the error of level L. While it is above the tolerance, and the work of the next level is left, L grows.
 /// Filters in closed form are run once: their error is that of rounding and of their ODE solver and, for
-/// continuous records, the difference that every other row makes.
+/// continuous records, the part of the rows.
 ///
 /// Everything is decided by counted work and the numbers found: the same input gives the same bytes anywhere.
 class ControlledFilter {

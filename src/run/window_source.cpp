@@ -20,8 +20,7 @@ class RecordedWindows final : public WindowSource {
       : owned_(std::move(owned)),
         rows_(rows),
         windows_(rows_, model.observation, model.timing,
-                 steps.value_or(default_steps(rows_, model.observation))),
-        inner_rows_(model.observation == ObservationKind::continuous && windows_.size() < rows_.rows() - 1) {}
+                 steps.value_or(default_steps(rows_, model.observation))) {}
 
   bool next(ObservationWindow& window) override {
     if (done_ == windows_.size()) return false;
@@ -35,7 +34,6 @@ class RecordedWindows final : public WindowSource {
   std::optional<double> end() const override { return windows_.end(); }
   std::size_t size() const override { return windows_.size(); }
   std::size_t rows() const override { return rows_.rows(); }
-  bool has_inner_rows() const override { return inner_rows_; }
   bool streams() const override { return false; }
   std::optional<ObservationRows> record() const override { return rows_; }
   std::string identity() const override {
@@ -54,7 +52,6 @@ class RecordedWindows final : public WindowSource {
   std::unique_ptr<const ObservationPath> owned_;
   ObservationRows rows_;
   ObservationWindows windows_;
-  bool inner_rows_;
   std::size_t done_ = 0;
 };
 
@@ -100,7 +97,6 @@ class StreamedWindows final : public WindowSource {
   std::optional<double> end() const override { return {}; }
   std::size_t size() const override { return 0; }
   std::size_t rows() const override { return rows_; }
-  bool has_inner_rows() const override { return false; }
   bool streams() const override { return true; }
   std::string identity() const override { return origin_; }
   void exchange(StateArchive& archive) override {

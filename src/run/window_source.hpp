@@ -25,9 +25,6 @@ class WindowSource {
   virtual std::optional<double> end() const = 0;  ///< of the last window, where it is known beforehand
   virtual std::size_t size() const = 0;           ///< number of windows, 0 where it is not known beforehand
   virtual std::size_t rows() const = 0;           ///< read so far
-  /// Whether a window has rows strictly inside, from which the second-order functional differs from the
-  /// trapezoid.
-  virtual bool has_inner_rows() const = 0;
   virtual bool streams() const = 0;
   /// All rows, where they are known beforehand.
   virtual std::optional<ObservationRows> record() const { return {}; }

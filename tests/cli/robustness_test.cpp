@@ -94,7 +94,7 @@ TEST_CASE("wrong usage is refused with the option, the value and the nearest rig
       {filter + "--method full-tree --steps 100", {"unpruned tree", "3^100"}},
       {filter + "--method euler --degree 5", {"--degree", "euler"}},
       {filter + "--method euler --ess-threshold 2", {"ess-threshold", "(2)"}},
-      {filter + "--alpha 0.5", {"--alpha", "klv"}},
+      {filter + "--method klv --alpha 0.5", {"--alpha", "klv"}},
       {filter + "--method euler --beta 0.5", {"--beta", "euler"}},
       {filter + "--method gaussian-mixture --alpha 2", {"alpha", "(2)"}},
       {filter + "--method gaussian-mixture --beta -1", {"beta", "(-1)"}},

@@ -138,10 +138,7 @@ double local_error(double s, double h0, double h1, double g) {
   w.end = s;
   w.row_times = t;
   w.row_values = y;
-  integrate_rows(w, 1);
-  // Here Y is linear between its rows, and no bridges add to C.
-  const double delta = s / (rows - 1);
-  w.covariation[0] -= (rows - 1) * (delta * delta / 6 - delta * delta * delta / (12 * s));
+  integrate_rows(w, 1, true);
   Batch a(1, 1), b(1, 1), G(1, 1);
   a(0, 0) = h0;
   b(0, 0) = h1;

@@ -25,13 +25,14 @@ ObservationWindow only_window(const ObservationPath& path) {
 
 }  // namespace
 
-TEST_CASE("increments alone give the unconditional integral and covariation") {
+TEST_CASE("without a row inside the path is linear, and its increment's likelihood asks for a bridge") {
   const auto path = path_of({1.0, 1.5}, {2.0, 0.0, 3.0, -1.0});
   const auto w = only_window(path);
   CHECK(w.increment == std::vector{1.0, -1.0});
   CHECK(w.integral[0] == Approx(0.25));
-  CHECK(w.covariation[0] == Approx(0.25 / 6));
-  CHECK(w.covariation[1] == 0.0);
+  CHECK(w.bridge == Approx(0.25 / 6));
+  CHECK(w.covariation[0] == Approx(0.5 / 12 + 0.25 / 6));  // U = D (1 - u/s): s D D^T/12
+  CHECK(w.covariation[1] == Approx(-0.5 / 12));
   CHECK(w.bridge_start[0] == Approx(0.25 / 24));  // U = D (1 - u/s): s^2 D/24
   CHECK(w.bridge_end[1] == Approx(-0.25 / 24));
 }
@@ -78,7 +79,7 @@ TEST_CASE("rows at unequal times, one component among several") {
   double bridge = 0;
   for (std::size_t r = 0; r + 1 < t.size(); ++r) {
     const double delta = t[r + 1] - t[r];
-    bridge += delta * delta / 6 - delta * delta * delta / (12 * s);
+    bridge += delta * delta / 6;
   }
   CHECK(w.integral[1] == Approx(s * D / 2).epsilon(1e-13));
   CHECK(w.covariation[4] == Approx(D * D * s / 12 + bridge).epsilon(1e-12));
@@ -87,8 +88,9 @@ TEST_CASE("rows at unequal times, one component among several") {
 }
 
 TEST_CASE("coarse rows give the conditional expectation of what fine rows give") {
-  // Null hypothesis: E[I_fine - I_coarse] = 0 and E[C_fine - C_coarse] = 0 for Brownian Y, with 3 coarse rows
-  // of 64 fine ones. 20000 draws; z threshold 5.5: two-sided false-alarm rate 4e-8 a test, 2 tests.
+  // Null hypothesis for Brownian Y, with 3 coarse rows of 64 fine ones: E[I_fine - I_coarse] = 0, and E C = s^2/6 +
+  // sum delta^3/(12 s) for both: the second term is the variance of I given the rows, over s, which the likelihood
+  // of increments asks for. 20000 draws; z threshold 5.5: two-sided false-alarm rate 4e-8 a test, 2 tests.
   constexpr std::size_t fine = 64, draws = 20000;
   double sum[2] = {}, squares[2] = {};
   std::vector<double> t(fine + 1), z(fine);
@@ -99,7 +101,9 @@ TEST_CASE("coarse rows give the conditional expectation of what fine rows give")
     for (std::size_t r = 0; r < fine; ++r) y[r + 1] = y[r] + z[r] / 8;  // sqrt(1/64)
     const auto a = path_of(t, y), b = path_of({t[0], t[16], t[64]}, {y[0], y[16], y[64]});
     const auto wf = only_window(a), wc = only_window(b);
-    const double difference[2] = {wf.integral[0] - wc.integral[0], wf.covariation[0] - wc.covariation[0]};
+    const double expected = (fine * std::pow(1.0 / fine, 3) - std::pow(0.25, 3) - std::pow(0.75, 3)) / 12;
+    const double difference[2] = {wf.integral[0] - wc.integral[0],
+                                  wf.covariation[0] - wc.covariation[0] - expected};
     for (int i = 0; i < 2; ++i) {
       sum[i] += difference[i];
       squares[i] += difference[i] * difference[i];
@@ -168,7 +172,8 @@ TEST_CASE("times that a double does not tell apart are refused, not repeated") {
                     Catch::Contains("row 2") && Catch::Contains("too short for"));
   CHECK_THROWS_WITH(discrete(path_of({1e15, 1e15 + 1}, {0, 0}), 100), Catch::Contains("too short for"));
   CHECK(discrete(path_of({0, 1e-320}, {0, 0}), 1).size() == 2);
-  const ObservationWindows windows = discrete(path_of({1e9, 1e9 + 1}, {0, 0}), 1000);
+  const ObservationPath late = path_of({1e9, 1e9 + 1}, {0, 0});
+  const ObservationWindows windows = discrete(late, 1000);
   ObservationWindow w;
   for (std::size_t j = 1; j < windows.size(); ++j) {
     windows.get(j, w);

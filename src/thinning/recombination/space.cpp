@@ -109,7 +109,7 @@ PatchReduction::Result PatchReduction::reduce(const SpacePartition& partition, C
   return {points_.count, change * weight * std::exp(heaviest - largest)};
 }
 
-/// The patch's components become coordinates on [-1,1]; those that are constant are left out.
+/// The patch's components become coordinates on [-1,1], up to rounding; those that are constant are left out.
 void PatchReduction::fill_box(ConstBatchView x, std::span<const double> unit,
                               std::span<const std::uint32_t> order) {
   std::size_t varying = 0;
@@ -121,7 +121,9 @@ void PatchReduction::fill_box(ConstBatchView x, std::span<const double> unit,
     const auto [low, high] = std::minmax_element(z.begin(), z.end());
     const double half = *high / 2 - *low / 2, centre = *low + half;
     if (!(half > 0)) continue;
-    for (double& value : z) value = std::clamp((value - centre) / half, -1.0, 1.0);
+    // One affine map for all points. The centre's rounding leaves ends beyond 1, by as much as 1 where they are an ulp
+    // apart; put back to 1 they would no longer keep the moments of where they are.
+    for (double& value : z) value = (value - centre) / half;
     half_[varying++] = half / unit[i];
   }
   points_.dimension = varying;
