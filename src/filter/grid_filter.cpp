@@ -71,6 +71,8 @@ void GridFilter::advance(const ObservationWindow& window) {
       const double gap = window.row_times[r + 1] - window.row_times[r];
       for (std::size_t i = 0; i < k; ++i)
         slope_[i] = (window.row_values[(r + 1) * k + i] - window.row_values[r * k + i]) / gap;
+      // 1/2 |V h|^2 times the gap's part delta^2/6 of the window's bridge, over its length.
+      bridge_ = window.bridge > 0 ? gap / 12 : 0;
       evolve(gap, slope_, window);
     }
   } else if (window.length() > 0) {
@@ -161,7 +163,7 @@ void GridFilter::guarded_step(double s, std::span<const double> slope, const Obs
 void GridFilter::step(double s, std::span<const double> slope, const ObservationWindow& window) {
   if (slope.empty()) return transport(s);
   const double noise = rounding * density_.largest();
-  fields_.potential(slope, log_factor_, correction_);
+  fields_.potential(slope, bridge_, log_factor_, correction_);
   multiply(s / 6, noise, window);
   transport(s / 2);
   for (std::size_t n = 0; n < log_factor_.size(); ++n) log_factor_[n] -= s * s / 48 * correction_[n];

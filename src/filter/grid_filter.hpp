@@ -62,6 +62,7 @@ class GridFilter final : public Filter {
   BandedExponential exponential_;
   double exponential_of_ = 0;  // the time it is factorised for
   std::vector<double> slope_, log_factor_, correction_;
+  double bridge_ = 0;  ///< what |V h|^2 adds to the potential between rows
 
   Batch points_, covariance_;
   std::vector<double> weight_, scratch_;

@@ -63,7 +63,8 @@ void LineFields::read(const LineGrid& grid, const std::string& where) {
   }
 }
 
-void LineFields::potential(std::span<const double> slope, std::span<double> U, std::span<double> G) const {
+void LineFields::potential(std::span<const double> slope, double bridge, std::span<double> U,
+                           std::span<double> G) const {
   const std::size_t k = slope.size(), p = diffusion_.components();
   for (std::size_t n = 0; n < U.size(); ++n) {
     U[n] = 0;
@@ -71,8 +72,11 @@ void LineFields::potential(std::span<const double> slope, std::span<double> U, s
     for (std::size_t i = 0; i < k; ++i) U[n] += sensor_(i, n) * (slope[i] - sensor_(i, n) / 2);
     for (std::size_t r = 0; r < p; ++r) {
       double derivative = 0;
-      for (std::size_t i = 0; i < k; ++i)
-        derivative += (slope[i] - sensor_(i, n)) * derivative_(i * p + r, n);
+      for (std::size_t i = 0; i < k; ++i) {
+        const double Vh = derivative_(i * p + r, n);
+        derivative += (slope[i] - sensor_(i, n)) * Vh;
+        U[n] += bridge * Vh * Vh;
+      }
       G[n] += derivative * derivative;
     }
   }

@@ -227,11 +227,12 @@ RowErrors ControlledFilter::errors_of(int level) const {
     }
     add(errors, some);
   }
-  if (closed_form()) {
+  if (closed_form() || !errors.empty()) {
     // Rounding to nine digits of the numbers and of the ODE solver's tolerance.
     errors.resize(answer->rows.size());
     for (std::size_t r = 0; r < errors.size(); ++r) {
       errors[r] += rounding_error(answer->rows[r].mean);
+      if (!closed_form()) continue;
       // Continuous: Riccati's equation to 1e-6.
       if (model_.observation == ObservationKind::continuous) errors[r] += {1e-5, 1e-5, 1e-5, 1e-5};
     }

@@ -194,6 +194,44 @@ TEST_CASE("families are spread: mean and variance stay, the staircase goes") {
   CHECK(q[0] == Approx(-q[1]).epsilon(1e-9));
 }
 
+TEST_CASE("few families: quantiles by their moments, and inside declared bounds") {
+  // The law .7 N(-.3, s^2) + .3 N(.7, s^2), each by the three points of Gauss and Hermite: two families of one standard
+  // deviation. Its third cumulant moves quantiles by .018 standard deviations.
+  const auto families = [](double s) {
+    const double root = std::sqrt(3.0), centre[2] = {-0.3, 0.7}, mass[2] = {0.7, 0.3};
+    Measure m{Batch(1, 6), std::vector<double>(6), {}};
+    for (std::size_t branch = 0; branch < 3; ++branch)
+      for (std::size_t parent = 0; parent < 2; ++parent) {
+        m.points(0, 2 * branch + parent) = centre[parent] + (static_cast<double>(branch) - 1) * root * s;
+        m.weight[2 * branch + parent] = mass[parent] * (branch == 1 ? 2.0 / 3 : 1.0 / 6);
+      }
+    return m;
+  };
+  const auto quantile = [](const Measure& m, double level, std::span<const StateBound> bounds) {
+    Posterior p = m.posterior();
+    p.parents = 2;
+    p.bounds = bounds;
+    double q = 0;
+    Marginal(p, 0).quantiles(std::span(&level, 1), std::span(&q, 1));
+    return q;
+  };
+  const Measure m = families(1);
+  const double sd = std::sqrt(1 + 0.7 * 0.3);
+  for (const double level : {0.05, 0.5, 0.95}) {
+    const double q = quantile(m, level, {});
+    const auto Phi = [](double z) { return 0.5 * std::erfc(-z / std::sqrt(2.0)); };
+    const auto phi = [](double z) { return std::exp(-z * z / 2) / std::sqrt(2 * std::acos(-1.0)); };
+    const double excess = 0.7 * Phi(q + 0.3) + 0.3 * Phi(q - 0.7) - level;
+    CHECK(std::abs(excess) / (0.7 * phi(q + 0.3) + 0.3 * phi(q - 0.7)) < 3e-3 * sd);
+  }
+  const StateBound bound{-1, 2, Boundary::error};
+  CHECK(quantile(m, 0.05, std::span(&bound, 1)) == -1);
+  CHECK(quantile(m, 0.95, std::span(&bound, 1)) < 2);
+  CHECK(quantile(m, 0.9999, std::span(&bound, 1)) == 2);
+  // Two modes are no Gaussian: the families are taken as they are, the lower one's median being at level .35.
+  CHECK(quantile(families(0.05), 0.35, {}) == Approx(-0.3).margin(0.02));
+}
+
 TEST_CASE("merging many Gaussians keeps the law") {
   constexpr std::size_t N = 20000;
   Measure m{Batch(1, N), std::vector<double>(N, 1.0 / N), Batch(1, 1)};

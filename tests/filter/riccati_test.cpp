@@ -47,8 +47,9 @@ State runge_kutta(const LinearProblem& l, const ObservationPath& path, State x) 
   return x;
 }
 
-Posterior filtered(Filter& filter, const Model& model, const ObservationPath& path, std::size_t steps) {
-  run(filter, ObservationWindows(path, model.observation, model.timing, steps), {});
+Posterior filtered(Filter& filter, const ObservationPath& path, std::size_t steps) {
+  const std::size_t gaps = path.rows() - 1;
+  run(filter, ObservationWindows(path, rows_on_grid(path.times, steps == 0 ? gaps : steps), true), {});
   return filter.posterior();
 }
 
@@ -65,7 +66,7 @@ TEST_CASE("Kalman-Bucy filter: equals its equations solved by another method") {
       const State exact = runge_kutta(l, path, start);
       for (const std::size_t steps : {0, 7, 1}) {
         KalmanBucyFilter filter(model);
-        const Posterior q = filtered(filter, model, path, steps);
+        const Posterior q = filtered(filter, path, steps);
         INFO("d = " << d << ", random start " << random_start << ", steps " << steps);
         // Runge-Kutta: (|F| s)^4/120 with |F| s at most 5 * 5e-4: 1e-12. CVODE: 1e-12 a step, some hundred
         // steps.
@@ -115,7 +116,7 @@ TEST_CASE("Kalman-Bucy filter: without drift it is Benes' filter with mu = 0") {
   const ObservationPath path = simulate(model, 5, 5000, 500, 3).observations;
   KalmanBucyFilter filter(model);
   BenesFilter benes(model);
-  const Posterior p = filtered(filter, model, path, 0), q = filtered(benes, model, path, 0);
+  const Posterior p = filtered(filter, path, 0), q = filtered(benes, model, path, 0);
   CHECK(mean(p, 0) == Approx(mean(q, 0)).epsilon(0).margin(1e-10));
   CHECK(covariance(p, 0, 0) == Approx(covariance(q, 0, 0)).epsilon(1e-10));
   // Benes' evidence by Simpson's rule: (c gap)^5/2880 of |Y'|^2 a gap,
@@ -157,7 +158,7 @@ TEST_CASE("Kalman-Bucy filter: a constant sensor leaves the prior law, with Girs
   const ObservationPath path = simulate(model, 2, 100, 10, 3).observations;
   KalmanBucyFilter filter(model), none(prior);
   KalmanFilter kalman(prior);
-  const Posterior p = filtered(filter, model, path, 0);
+  const Posterior p = filtered(filter, path, 0);
   ObservationWindow w;
   w.end = 2;
   none.advance(w);
@@ -178,7 +179,7 @@ TEST_CASE("Kalman-Bucy filter: a vague start and a long run stay finite and righ
   const ObservationPath path =
       simulate(l.model("kind = \"continuous\"", false), 400, 4000, 4000, 3).observations;
   KalmanBucyFilter filter(model);
-  const Posterior p = filtered(filter, model, path, 0);
+  const Posterior p = filtered(filter, path, 0);
   Eigen::MatrixXd P;
   RiccatiEquation(l.A, l.B * l.B.transpose(), l.H, Eigen::MatrixXd::Zero(2, 2), 0.1).at(400, P);
   CHECK((covariance_of(p) - P).norm() < 1e-9);
