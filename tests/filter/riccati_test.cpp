@@ -116,7 +116,7 @@ TEST_CASE("Kalman-Bucy filter: without drift it is Benes' filter with mu = 0") {
   const ObservationPath path = simulate(model, 5, 5000, 500, 3).observations;
   KalmanBucyFilter filter(model);
   BenesFilter benes(model);
-  const Posterior p = filtered(filter, path, 0), q = filtered(benes, model, path, 0);
+  const Posterior p = filtered(filter, path, 0), q = filtered(benes, path, 0);
   CHECK(mean(p, 0) == Approx(mean(q, 0)).epsilon(0).margin(1e-10));
   CHECK(covariance(p, 0, 0) == Approx(covariance(q, 0, 0)).epsilon(1e-10));
   // Benes' evidence by Simpson's rule: (c gap)^5/2880 of |Y'|^2 a gap,
