@@ -68,11 +68,11 @@ Eigen::Index worst_axis(const std::vector<double>& effects, Eigen::Index d) {
   return worst;
 }
 
+}  // namespace
+
 bool all_missing(std::span<const double> y) {
   return std::all_of(y.begin(), y.end(), [](double v) { return std::isnan(v); });
 }
-
-}  // namespace
 
 ComponentConditioning::ComponentConditioning(const Model& model)
     : model_(model), expansion_(model), rule_(rule_for(model.reported_dimension())) {}

@@ -9,6 +9,9 @@
 
 namespace wienertree {
 
+/// Whether nothing was observed: all values are NaN.
+bool all_missing(std::span<const double> y);
+
 /// Multiplies every component by the likelihood g(y|x) and replaces each product by the Gaussian of its mass, mean
 /// and covariance.
 ///

@@ -6,7 +6,6 @@
 #include <cmath>
 #include <limits>
 
-#include "wienertree/filter/expectation.hpp"
 #include "wienertree/filter/places.hpp"
 #include "wienertree/filter/small_matrix.hpp"
 #include "wienertree/numeric/log_weights.hpp"
@@ -16,23 +15,12 @@ namespace {
 
 constexpr double negligible = 1e-14;  // of the largest weight
 
-// A tilt towards a likelihood that is no Gaussian leads to twice the posterior's covariance or more: wider than each mode
-// and than the shoulders of a heavy tail, at the price of twice the area in two dimensions. What it does to modes of
-// little weight far away is not seen by runs that all have it: it is weakened as tolerances fall, and left out where they
-// are above the default, which the coarsest run of the control of accuracy has.
-constexpr double default_tolerance = 0.1;
-double posterior_widening(double tolerance) { return 2 * default_tolerance / tolerance; }
-
 // Departure of a component from Gaussian over a substep, in units of FilterOptions::substep_tolerance. Merging, once
 // a substep, costs little in two dimensions and much in four, where patches are wide.
 double substep_factor(std::size_t d) { return d == 2 ? 0.1 : d == 3 ? 0.3 : 1.0; }
 
 // Width of a component in the tilted law, in standard deviations.
 double default_kappa(std::size_t d) { return d <= 3 ? 0.15 : d == 4 ? 0.28 : 0.35; }
-
-bool missing(std::span<const double> y) {
-  return std::all_of(y.begin(), y.end(), [](double v) { return std::isnan(v); });
-}
 
 // dX = (A X + a) dt + B dW, clock and all; nothing where the signal is none, or bounded.
 std::optional<LinearGaussianModel> affine_signal(const Model& model) {
@@ -239,7 +227,7 @@ void ComponentFilter::cross_in_substeps(const ObservationWindow& window, std::sp
   const std::size_t K = substeps_for(law, window.length());
   const unsigned steps = steps_for(window.length() / static_cast<double>(K));
   std::vector<Tilt> tilts(K + 1, Tilt::none(d_));
-  if (!y.empty() && !missing(y)) tilts = plan(window, y, law, K, steps);
+  if (!y.empty() && !all_missing(y)) tilts = plan(window, y, law, K, steps);
   substeps(tilts, window.length(), steps, options_.nodes);
 }
 
@@ -265,171 +253,6 @@ void ComponentFilter::narrow(std::size_t nodes) {
                &threads_);
   components_.swap(scratch_);
   merge_.merge(components_, nodes);
-}
-
-// Components that merging left too wide for the quotient are split to half the width that has none.
-void ComponentFilter::divide_by(const Tilt& tilt) {
-  divide(components_, tilt, wide_, &threads_);
-  if (wide_.empty()) return;
-  GaussianComponents rest, parts;
-  std::vector<std::uint8_t> is_wide(components_.size(), 0);
-  for (const std::uint32_t n : wide_) is_wide[n] = 1;
-  const auto copy = [&](const GaussianComponents& from, std::size_t n, GaussianComponents& to,
-                        std::size_t k) {
-    to.log_weight[k] = from.log_weight[n];
-    for (std::size_t i = 0; i < d_; ++i) to.mean(i, k) = from.mean(i, n);
-    for (std::size_t i = 0; i < d_ * d_; ++i) to.covariance(i, k) = from.covariance(i, n);
-  };
-  rest.reshape(d_, wide_.size());
-  for (std::size_t k = 0; k < wide_.size(); ++k) copy(components_, wide_[k], rest, k);
-  // H^{-1}, with unit variance where H has none: there nothing is too wide.
-  const SymmetricEigen<Eigen::Dynamic> eigen{SmallSquare<Eigen::Dynamic>(tilt.H)};
-  const double largest = eigen.values.maxCoeff();
-  Eigen::MatrixXd inverse = eigen.vectors *
-                            (1 / eigen.values.array().max(1e-9 * largest)).matrix().asDiagonal() *
-                            eigen.vectors.transpose();
-  constexpr std::size_t all_it_takes = 1 << 18;
-  split_.split(rest, inverse, 0.7, 0, all_it_takes, parts, &threads_);
-  std::vector<std::uint32_t> still_wide;
-  divide(parts, tilt, still_wide, &threads_);
-  if (!still_wide.empty())
-    throw RunError("a component is too wide for the tilt it carries", fmt::format("t = {:g}", time_));
-  scratch_.reshape(d_, components_.size() - wide_.size() + parts.size());
-  std::size_t to = 0;
-  for (std::size_t n = 0; n < components_.size(); ++n)
-    if (is_wide[n] == 0) copy(components_, n, scratch_, to++);
-  for (std::size_t n = 0; n < parts.size(); ++n) copy(parts, n, scratch_, to++);
-  components_.swap(scratch_);
-}
-
-// ---- the tilt
-
-Tilt ComponentFilter::expanded_tilt(std::span<const double> y, double clock, const LawMoments& law) {
-  Batch x(d_, 1), L(d_ * d_, 1), step(d_, 1), gradient(d_, 1), curvature(d_ * d_, 1);
-  ObservationExpansion::Scratch scratch;
-  std::vector<double> value(1);
-  put_vector(law.mean, x, 0);
-  for (std::size_t i = 0; i < d_; ++i) {
-    const double sd =
-        std::sqrt(std::max(0.0, law.covariance(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(i))));
-    for (std::size_t k = 0; k < d_; ++k) L(i * d_ + k, 0) = i == k ? 1.0 : 0.0;
-    step(i, 0) = (update_->expansion().additive() ? 1e-3 : 0.1) * sd;
-  }
-  update_->expansion().expand(y, clock, x, L, step, value, gradient, curvature, scratch);
-  return {law.mean, square_of<Eigen::Dynamic>(curvature, d_, 0), vector_of<Eigen::Dynamic>(gradient, d_, 0)};
-}
-
-std::vector<Tilt> ComponentFilter::plan(const ObservationWindow& window, std::span<const double> y,
-                                        const MixtureMoments& law, std::size_t K, unsigned steps) {
-  const LawMoments start{law.mean, law.covariance};
-  const double end = clock_ + window.length();
-  if (update_->expansion().linear_gaussian())
-    return path_.plan(start, clock_, window.length(), K, steps,
-                      [&](const LawMoments& reference) { return expanded_tilt(y, end, reference); });
-  const double tolerance = options_.substep_tolerance;
-  if (tolerance > 1.001 * default_tolerance) return std::vector<Tilt>(K + 1, Tilt::none(d_));
-  const GaussianComponents before = components_;
-  const std::size_t nodes = std::max<std::size_t>(60, options_.nodes / 4);
-  substeps(std::vector<Tilt>(K + 1, Tilt::none(d_)), window.length(), steps, nodes);
-  const MixtureMoments predicted = moments(components_);
-  take_in(y, end, nodes);
-  const MixtureMoments posterior = moments(components_);
-  pilot_evidence_ = posterior.log_mass;
-  components_ = before;
-  const Tilt last = tilt_between({predicted.mean, predicted.covariance},
-                                 {posterior.mean, posterior_widening(tolerance) * posterior.covariance});
-  return path_.plan(start, clock_, window.length(), K, steps, [&](const LawMoments&) { return last; });
-}
-
-// ---- the observation
-
-void ComponentFilter::weigh(const ObservationWindow& window, std::span<const double> y, double clock) {
-  if (y.empty() || missing(y)) return;
-  check_reach(window, y, clock);
-  const double spread = take_in(y, clock, options_.nodes);
-  if (spread > 0.15)
-    warn(WarningKind::unfit_tilt, window.end,
-         fmt::format("more components than {} were needed for the likelihood, whose logarithm departs from a "
-                     "quadratic "
-                     "by {:.2g} in those there are",
-                     8 * options_.nodes, spread));
-  const LargestLogWeight largest = largest_log_weight(components_.log_weight);
-  if (!largest.all_valid || !(largest.value > -std::numeric_limits<double>::infinity()))
-    throw RunError("the observation has no likelihood", place_and_observation(window));
-  const MixtureMoments law = moments(components_);
-  if (pilot_evidence_ && std::abs(*pilot_evidence_ - law.log_mass) > 0.5)
-    warn(WarningKind::unfit_tilt, window.end,
-         fmt::format("the likelihood is far from Gaussian: filters with and without a tilt towards it differ "
-                     "by {:.2g} "
-                     "in log evidence",
-                     std::abs(*pilot_evidence_ - law.log_mass)));
-  if (nonlinear_ && components_.size() > 1 && law.effective_size < 5)
-    warn(WarningKind::few_atoms, window.end,
-         fmt::format("{:.1f} of {} components carry the law after an observation", law.effective_size,
-                     components_.size()));
-}
-
-// Divides what the likelihood calls for, and conditions.
-double ComponentFilter::take_in(std::span<const double> y, double clock, std::size_t nodes) {
-  const ComponentUpdate::Limits limits{0.25 * options_.substep_tolerance, (d_ == 2 ? 24 : 8) * nodes};
-  const double left = update_->condition(y, clock, limits, components_, &threads_);
-  if (components_.size() > 8 * nodes) merge_.merge(components_, 8 * nodes);
-  return left;
-}
-
-// (y - predicted)^2/S of each component of y with Gaussian noise.
-void ComponentFilter::check_reach(const ObservationWindow& window, std::span<const double> y, double clock) {
-  const std::vector<double>& R = update_->expansion().gaussian_variances();
-  if (R.empty()) return;
-  const MixtureMoments law = moments(components_);
-  const GaussianCubature& rule = equations_.rule();
-  const auto points = static_cast<std::size_t>(rule.weights.size());
-  const Eigen::MatrixXd L = semidefinite_root(law.covariance);
-  Batch x(model_.state_dimension(), points), h(y.size(), points);
-  for (std::size_t q = 0; q < points; ++q)
-    put_vector(Eigen::VectorXd(law.mean + L * rule.points.col(static_cast<Eigen::Index>(q))), x, q);
-  equations_.complete(x, clock);
-  model_.fields->sensor(x, h);
-  for (std::size_t i = 0; i < y.size(); ++i) {
-    if (std::isnan(y[i])) continue;
-    double mean = 0, variance = R[i];
-    for (std::size_t q = 0; q < points; ++q) mean += rule.weights(static_cast<Eigen::Index>(q)) * h(i, q);
-    for (std::size_t q = 0; q < points; ++q)
-      variance += rule.weights(static_cast<Eigen::Index>(q)) * (h(i, q) - mean) * (h(i, q) - mean);
-    const double distance = (y[i] - mean) * (y[i] - mean) / variance;
-    if (distance > 50)
-      warn(WarningKind::out_of_reach, window.end,
-           fmt::format("y{} = {:g} lies {:.1f} standard deviations from its prediction {:.4g}", i + 1, y[i],
-                       std::sqrt(distance), mean));
-  }
-}
-
-void ComponentFilter::check_bounds(double time) {
-  for (std::size_t i = 0; i < d_; ++i) {
-    const StateBound& b = model_.bounds[i];
-    if (!b.bounded()) continue;
-    const double largest = largest_log_weight(components_.log_weight).value;
-    double mass = 0, outside = 0;
-    for (std::size_t n = 0; n < components_.size(); ++n) {
-      const double w = std::exp(components_.log_weight[n] - largest), x = components_.mean(i, n);
-      const double sd = std::sqrt(std::max(0.0, components_.covariance(i * d_ + i, n)));
-      const auto beyond = [&](double distance) {
-        return sd > 0 ? 0.5 * std::erfc(distance / (sd * std::sqrt(2.0))) : distance < 0 ? 1.0 : 0.0;
-      };
-      mass += w;
-      outside += w * (beyond(x - b.lower) + beyond(b.upper - x));
-    }
-    if (outside > 1e-3 * mass)
-      warn(WarningKind::at_bound, time,
-           fmt::format("{:.2g} of the law of {} lies beyond its bounds, where fields are taken at the bound",
-                       outside / mass, model_.state_names[i]));
-  }
-}
-
-void ComponentFilter::warn(WarningKind kind, double time, std::string text) {
-  for (const FilterWarning& w : warnings_)
-    if (w.kind == kind) return;
-  warnings_.push_back({kind, time, std::move(text)});
 }
 
 // ---- state
