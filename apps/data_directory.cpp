@@ -58,23 +58,30 @@ fs::path bundled_file(const std::string& name, const std::string& folder, const 
 
 }  // namespace
 
+namespace {
+
+// Where the bundled data should be.
+fs::path data_place() {
+  if (const char* set = std::getenv("WIENERTREE_DATA"); set != nullptr && *set != '\0') return set;
+  const fs::path binary = this_binary();
+  const bool built = is_below(binary, WIENERTREE_BUILD_DIRECTORY "/apps") ||
+                     is_below(binary, WIENERTREE_BUILD_DIRECTORY "/python");
+  return built ? fs::path(WIENERTREE_SOURCE_DATA) : installed_data(binary);
+}
+
+}  // namespace
+
 fs::path data_directory() {
-  fs::path directory;
-  if (const char* set = std::getenv("WIENERTREE_DATA"); set != nullptr && *set != '\0') {
-    directory = set;
-  } else if (const fs::path binary = this_binary(); is_below(binary, WIENERTREE_BUILD_DIRECTORY "/apps") ||
-                                                    is_below(binary, WIENERTREE_BUILD_DIRECTORY "/python")) {
-    directory = WIENERTREE_SOURCE_DATA;
-  } else {
-    directory = installed_data(binary);
-  }
+  fs::path directory = data_place();
   if (std::error_code failure; !fs::is_directory(directory, failure))
     throw InputError("the bundled data is not there; WIENERTREE_DATA may name its directory", "data",
                      directory.string());
   return directory;
 }
 
-fs::path formulas_directory() { return data_directory() / "cubature_formulas"; }
+fs::path formulas_directory(bool needed) {
+  return (needed ? data_directory() : data_place()) / "cubature_formulas";
+}
 
 std::vector<std::string> bundled_names(const std::string& folder, const std::string& extension) {
   std::vector<std::string> names;

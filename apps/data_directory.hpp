@@ -12,7 +12,9 @@ namespace wienertree::app {
 std::filesystem::path data_directory();
 
 /// The folder of the bundled cubature formulas.
-std::filesystem::path formulas_directory();
+/// @param needed whether it must be there: closed forms and particles go without
+/// @throws InputError if it is needed and the data directory is not there
+std::filesystem::path formulas_directory(bool needed = true);
 
 /// Names of the files with this extension in a folder of the data directory, without extension, sorted.
 std::vector<std::string> bundled_names(const std::string& folder, const std::string& extension);

@@ -194,7 +194,7 @@ ControlOptions control_options(const AccuracyArguments& accuracy, const FilterAr
   control.highest_moment = moments.value_or(0);
   if (steps) control.steps = *steps;
   control.nodes_given = filter.nodes.has_value();
-  control.formulas = formulas_directory();
+  control.formulas = formulas_directory(false);
   return control;
 }
 
@@ -214,7 +214,7 @@ FilterSetup filter_setup(const FilterArguments& a, const Model& model) {
   const bool tree = method == FilterMethod::klv || method == FilterMethod::full_tree;
   if (tree && a.formula_name)
     given.formula = choose_formula(a.degree, a.formula_name, model.noise_dimension());
-  FilterSetup setup = recommended_options(model, given, formulas_directory());
+  FilterSetup setup = recommended_options(model, given, formulas_directory(tree));
   refuse_oversized_filter(model, setup.options, setup.launches);
   return setup;
 }

@@ -223,4 +223,13 @@ TEST_CASE("bundled data that is not there is named") {
   Workplace place;
   place.environment["WIENERTREE_DATA"] = "/no/such/directory";
   check_refusal(place, "model list", 2, {"WIENERTREE_DATA", "/no/such/directory"});
+  // A model of one's own that an exact filter solves, or particles, need no formula.
+  place.write("mine.toml",
+              "name = \"mine\"\nconvention = \"ito\"\n[state]\nx = { initial = 0 }\n[drift]\nx = "
+              "\"-x\"\n[diffusion]\nx = [1]\n"
+              "[observation]\nkind = \"continuous\"\nh = [\"x\"]\n");
+  place.write("mine.csv", "t,y1\n0,0\n1,0.5\n2,0.25\n");
+  CHECK(place.run("filter mine.toml --observations mine.csv").code == 0);
+  CHECK(place.run("filter mine.toml --observations mine.csv --method euler --nodes 100").code == 0);
+  check_refusal(place, "filter mine.toml --observations mine.csv --method klv", 2, {"WIENERTREE_DATA"});
 }
