@@ -52,8 +52,7 @@ void BenesFilter::advance(const ObservationWindow& window) {
       elapsed_ += delta;
     }
   if (observed_) log_z_ += p_.h1 * p_.h1 * p_.sigma * p_.sigma * window.bridge / 2;
-  if (!observed_)
-    elapsed_ += window.length();
+  if (!observed_) elapsed_ += window.length();
   posterior_.time = window.end;
   P_ = p_.sigma * p_.sigma * tanh_over(observed_ ? std::fabs(p_.h1 * p_.sigma) : 0.0, elapsed_);
 }

@@ -26,7 +26,8 @@ class LineFields {
 
   /// U = h.y - |h|^2/2 + `bridge` sum_ri (V_r h_i)^2, and G = sum_r (sum_i (y_i - h_i) V_r h_i)^2, which is sum_r (V_r U)^2 for
   /// bridge = 0, at the nodes; y = slope.
-  void potential(std::span<const double> slope, double bridge, std::span<double> U, std::span<double> G) const;
+  void potential(std::span<const double> slope, double bridge, std::span<double> U,
+                 std::span<double> G) const;
 
   /// Rate 1/tau at which the density changes in a way that limits the steps:
   ///     E[sigma^2 s^2]/2 + E[b'^2]^{1/2} + E[b^2 s^2]^{1/2}/4 + sum_i var h_i,   s = (log density)'

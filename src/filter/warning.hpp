@@ -17,7 +17,7 @@ enum class WarningKind {
   start_not_represented,    ///< moments of the start to degree 4 are not those of the nodes
   one_family,               ///< the weights of separate modes hang on a single family
   shared_noise,             ///< one Brownian motion drives all components
-  unfit_tilt,               ///< a likelihood that one Gaussian, or as many components as there may be, does not fit
+  unfit_tilt,  ///< a likelihood that one Gaussian, or as many components as there may be, does not fit
 };
 
 struct FilterWarning {

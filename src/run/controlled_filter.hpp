@@ -29,7 +29,7 @@ enum class RunRole : std::uint8_t {
   steps,   ///< level, but for the number of steps, where steps are given
   nodes,   ///< level, but for half the nodes, where nodes are given
   degree,  ///< level, but for the degree m + 2 of the formula, or m - 2 where there is none
-  rows,    ///< level, but with the observed path linear between rows, which is the first order of their spacing
+  rows,  ///< level, but with the observed path linear between rows, which is the first order of their spacing
   launch_1,  ///< random methods: a quarter of the particles, other random numbers
   launch_2,
 };
