@@ -78,7 +78,9 @@ std::array<JacobiTransition::Child, 4> JacobiTransition::children(double x, int 
   std::array<Child, 4> result{};
   const Moments m = moments(process_, x, s, h, highest);
   const long double variance = m[2] - m[1] * m[1];
-  const auto place = [&](long double y) { return std::clamp(static_cast<double>(x + h * y), lower, upper); };
+  const auto place = [&, low = lower, high = upper](long double y) {
+    return std::clamp(static_cast<double>(x + h * y), low, high);
+  };
   if (!(variance > 1e-24L)) {  // a bound that is not left
     result.fill({place(m[1]), 1 / static_cast<double>(q)});
     return result;
