@@ -4,7 +4,6 @@
 #include <string_view>
 
 #include "../../apps/checkpoint.hpp"
-#include "../../apps/checksum.hpp"
 #include "file.hpp"
 #include "wienertree/cubature/construct.hpp"
 #include "wienertree/filter/filter.hpp"
