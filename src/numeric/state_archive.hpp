@@ -81,6 +81,8 @@ class StateArchive {
       pass_bytes(&columns, sizeof columns);
       if (reading_) {
         const auto most = static_cast<std::int64_t>(rest_.size() / sizeof(double));
+        constexpr std::int64_t fixed_rows = T::RowsAtCompileTime, fixed_columns = T::ColsAtCompileTime;
+        require((fixed_rows < 0 || rows == fixed_rows) && (fixed_columns < 0 || columns == fixed_columns));
         require(rows >= 0 && columns >= 0 && (rows == 0 || columns <= most / rows));
         value.resize(rows, columns);
       }
