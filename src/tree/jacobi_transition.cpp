@@ -2,10 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 #include "wienertree/cubature/gauss_moments.hpp"
-#include "wienertree/numeric/error.hpp"
 
 namespace wienertree {
 
@@ -97,27 +95,15 @@ std::array<JacobiTransition::Child, 4> JacobiTransition::children(double x, int 
 
 void JacobiTransition::grow(const Generation& parents, int degree, double s, ThreadPool* threads,
                             Generation& children) const {
-  const std::size_t nodes = parents.size(), count = branches(degree);
-  if (nodes > std::numeric_limits<std::uint32_t>::max() / count)
-    throw InputError("too many children for 32-bit indices", "Jacobi's transition");
-  children.time = parents.time + s;
-  children.states.reshape(parents.states.components(), nodes * count);
-  resize_unspecified(children.log_weight, nodes * count);
-  resize_unspecified(children.log_likelihood, parents.log_likelihood.empty() ? 0 : nodes * count);
-  resize_unspecified(children.parent, nodes * count);
-  resize_unspecified(children.branch, nodes * count);
-  children.count.clear();
+  const std::size_t count = branches(degree);
+  reserve_children(parents, count, s, "Jacobi's transition", children);
   constexpr std::size_t block = 16;
-  for_blocks(threads, nodes, block, [&](std::size_t first, std::size_t in_block, std::size_t) {
+  for_blocks(threads, parents.size(), block, [&](std::size_t first, std::size_t in_block, std::size_t) {
     for (std::size_t n = first; n < first + in_block; ++n) {
       const std::array<Child, 4> fan = this->children(parents.states(0, n), degree, s);
       for (std::size_t branch = 0; branch < count; ++branch) {
-        const std::size_t child = branch * nodes + n;
-        children.states(0, child) = fan[branch].x;
-        children.log_weight[child] = parents.log_weight[n] + std::log(fan[branch].weight);
-        children.parent[child] = static_cast<std::uint32_t>(n);
-        children.branch[child] = static_cast<std::uint16_t>(branch);
-        if (!parents.log_likelihood.empty()) children.log_likelihood[child] = parents.log_likelihood[n];
+        const double log_weight = parents.log_weight[n] + std::log(fan[branch].weight);
+        children.states(0, place_child(parents, n, branch, log_weight, children)) = fan[branch].x;
       }
     }
   });

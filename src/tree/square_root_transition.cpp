@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <utility>
 
 #include "wienertree/cubature/square_root_rule.hpp"
@@ -51,21 +50,13 @@ std::size_t SquareRootTransition::branches(int degree) const {
 
 void SquareRootTransition::grow(const Generation& parents, int degree, double s, ThreadPool* threads,
                                 Generation& children) const {
-  const std::size_t nodes = parents.size(), count = branches(degree), K = structure_.components.size();
-  if (nodes > std::numeric_limits<std::uint32_t>::max() / count)
-    throw InputError("too many children for 32-bit indices", "square-root transition");
-  children.time = parents.time + s;
-  children.states.reshape(parents.states.components(), nodes * count);
-  resize_unspecified(children.log_weight, nodes * count);
-  resize_unspecified(children.log_likelihood, parents.log_likelihood.empty() ? 0 : nodes * count);
-  resize_unspecified(children.parent, nodes * count);
-  resize_unspecified(children.branch, nodes * count);
-  children.count.clear();
+  const std::size_t count = branches(degree), K = structure_.components.size();
+  reserve_children(parents, count, s, "square-root transition", children);
   std::vector<SquareRootRule> rules;
   for (const SquareRootStructure::Component& component : structure_.components)
     rules.emplace_back(component.process, s, rule_nodes(degree), structure_.nonnegative_integrals);
   constexpr std::size_t block = 64;
-  for_blocks(threads, nodes, block, [&](std::size_t first, std::size_t in_block, std::size_t) {
+  for_blocks(threads, parents.size(), block, [&](std::size_t first, std::size_t in_block, std::size_t) {
     std::vector<Fan> fans(K);
     for (std::size_t n = first; n < first + in_block; ++n) {
       for (std::size_t k = 0; k < K; ++k) {
@@ -74,25 +65,25 @@ void SquareRootTransition::grow(const Generation& parents, int degree, double s,
         fans[k] = fan_of(rules[k], w, integrated_[k]);
       }
       for (std::size_t branch = 0; branch < count; ++branch) {
-        const std::size_t child = branch * nodes + n;
         double log_weight = parents.log_weight[n];
+        std::size_t digits = branch;
+        for (const Fan& fan : fans) {
+          log_weight += fan.log_weight[digits % fan.size];
+          digits /= fan.size;
+        }
+        const std::size_t child = place_child(parents, n, branch, log_weight, children);
         for (const SquareRootStructure::Integral& integral : structure_.integrals)
           children.states(integral.state, child) = parents.states(integral.state, n) + integral.constant * s;
-        std::size_t digits = branch;
+        digits = branch;
         for (std::size_t k = 0; k < K; ++k) {
           const Fan& fan = fans[k];
           const std::size_t digit = digits % fan.size;
           digits /= fan.size;
-          log_weight += fan.log_weight[digit];
           const SquareRootStructure::Component& component = structure_.components[k];
           children.states(component.state, child) = fan.v[digit] - component.shift;
           for (const SquareRootStructure::Integral& integral : structure_.integrals)
             children.states(integral.state, child) += integral.of_component[k] * fan.integral[digit];
         }
-        children.log_weight[child] = log_weight;
-        children.parent[child] = static_cast<std::uint32_t>(n);
-        children.branch[child] = static_cast<std::uint16_t>(branch);
-        if (!parents.log_likelihood.empty()) children.log_likelihood[child] = parents.log_likelihood[n];
       }
     }
   });

@@ -21,6 +21,15 @@ class TransitionRule {
   /// threads; buffers of `children` are reused.   s: length of the step
   virtual void grow(const Generation& parents, int degree, double s, ThreadPool* threads,
                     Generation& children) const = 0;
+
+ protected:
+  /// Room for `count` children of each parent, after a step of length s; `where` names the rule in the message.
+  /// @throws InputError if 32-bit indices do not suffice
+  static void reserve_children(const Generation& parents, std::size_t count, double s, const char* where,
+                               Generation& children);
+  /// What every child has besides its state. @return its number
+  static std::size_t place_child(const Generation& parents, std::size_t parent, std::size_t branch,
+                                 double log_weight, Generation& children);
 };
 
 }  // namespace wienertree
