@@ -142,14 +142,7 @@ unsigned ComponentFilter::steps_for(double length) const {
 double ComponentFilter::departure(const GaussianComponents& c, double clock, double length) {
   std::vector<double> out(c.size());
   equations_.departure_from_affine(c.mean, c.covariance, clock, length, out, moving_[0]);
-  const double largest = largest_log_weight(c.log_weight).value;
-  double mass = 0, sum = 0;
-  for (std::size_t n = 0; n < c.size(); ++n) {
-    const double w = std::exp(c.log_weight[n] - largest);
-    mass += w;
-    sum += w * out[n] * out[n];
-  }
-  return std::sqrt(sum / mass);
+  return root_mean_square(c, out);
 }
 
 bool ComponentFilter::carry(const ObservationWindow& window) {

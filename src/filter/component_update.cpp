@@ -148,14 +148,7 @@ double ComponentUpdate::condition(std::span<const double> y, double clock, const
     conditioning_.condition(y, clock, components, threads);
   }
   components.swap(accepted_);
-  const double largest = largest_log_weight(components.log_weight).value;
-  double mass = 0, squares = 0;
-  for (std::size_t n = 0; n < components.size(); ++n) {
-    const double w = std::exp(components.log_weight[n] - largest);
-    mass += w;
-    squares += w * spread_[n] * spread_[n];
-  }
-  const double left = std::sqrt(squares / mass);
+  const double left = root_mean_square(components, spread_);
   return left > 2 * most_relief * limits.spread ? left : 0;
 }
 

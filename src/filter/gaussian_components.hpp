@@ -1,8 +1,11 @@
 #pragma once
 /// A measure that is a sum of Gaussians, as a structure of arrays.
+#include <cmath>
+#include <span>
 #include <vector>
 
 #include "wienertree/numeric/batch.hpp"
+#include "wienertree/numeric/log_weights.hpp"
 #include "wienertree/numeric/state_archive.hpp"
 
 namespace wienertree {
@@ -28,5 +31,17 @@ struct GaussianComponents {
   }
   void exchange(StateArchive& archive) { archive(log_weight, mean, covariance); }
 };
+
+/// The root mean square of `values`, one a component, under the components' weights.
+inline double root_mean_square(const GaussianComponents& c, std::span<const double> values) {
+  const double largest = largest_log_weight(c.log_weight).value;
+  double mass = 0, sum = 0;
+  for (std::size_t n = 0; n < c.size(); ++n) {
+    const double w = std::exp(c.log_weight[n] - largest);
+    mass += w;
+    sum += w * values[n] * values[n];
+  }
+  return std::sqrt(sum / mass);
+}
 
 }  // namespace wienertree
