@@ -8,6 +8,8 @@
 #include <cmath>
 #include <numbers>
 
+#include "wienertree/model/scalar_functions.hpp"
+
 namespace wienertree {
 
 namespace {
@@ -23,7 +25,7 @@ constexpr double many_degrees = 100;
 // by n = 1e16.
 double log_student_normaliser(double n) {
   if (n < many_degrees)
-    return std::lgamma(0.5 * (n + 1.0)) - std::lgamma(0.5 * n) - 0.5 * std::log(n * std::numbers::pi);
+    return scalar::lgamma(0.5 * (n + 1.0)) - scalar::lgamma(0.5 * n) - 0.5 * std::log(n * std::numbers::pi);
   const double b = 2 / n, b2 = b * b;
   const double series = b * (-1. / 8 + b2 * (1. / 192 + b2 * (-1. / 640 + b2 * (17. / 14336))));
   return series - 0.5 * std::log(2 * std::numbers::pi);
