@@ -65,7 +65,7 @@ std::string StudyJournal::header() const {
 }
 
 std::string StudyJournal::line_of(const RunRecord& r) const {
-  std::string line = fmt::format("{},{},{},{}", r.identity, csv_field(r.cell), r.path, r.launch);
+  std::string line = fmt::format("{},{},{},{}", csv_field(r.identity), csv_field(r.cell), r.path, r.launch);
   for (std::size_t q = 0; q < quantities_.size(); ++q) {
     add_number(line, r.value[q]);
     add_number(line, r.truth[q]);

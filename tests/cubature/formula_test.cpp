@@ -322,3 +322,11 @@ TEST_CASE("What is not in the catalogue is answered with what is") {
   CHECK_THROWS_WITH(find_formula("lyons-victoir", shipped), Catch::Matchers::Contains("lyons-victoir-5-1, "));
   CHECK(find_formula("moment-equations-7-1", shipped).degree == 7);
 }
+
+TEST_CASE("A minus before a zero is not kept in a file: what is written reads back as the same text") {
+  const std::string text =
+      R"({"name": "n", "degree": 3, "dimension": 1, "source": "s", "paths": [{"weight": 0.5, "segments": [[1, -0.0]]}]})";
+  const std::string written = format_formula(parse_formula(text, "f.json"));
+  CHECK(written.find("-0") == std::string::npos);
+  CHECK(format_formula(parse_formula(written, "g.json")) == written);
+}
