@@ -53,6 +53,7 @@ endif()
 set(wienertree_test_options ${level} "$<$<CXX_COMPILER_ID:GNU>:-Wno-array-bounds;-Wno-stringop-overflow;-Wno-stringop-overread>")
 
 # wienertree_test(<name> LIBS <targets>... SOURCES <files>... [LABELS <labels>...] [TIMEOUT <s>] [ENVIRONMENT <NAME=value>...]): one Catch2 program, one ctest entry.
+# Labels: papers (statistics), slow (only when asked for), threads (has cases with the tag [threads]).
 function(wienertree_test name)
   cmake_parse_arguments(ARG "" "TIMEOUT" "LIBS;SOURCES;LABELS;ENVIRONMENT" ${ARGN})
   add_executable(test_${name} ${ARG_SOURCES})
@@ -61,13 +62,17 @@ function(wienertree_test name)
   target_include_directories(test_${name} PRIVATE ${PROJECT_SOURCE_DIR}/tests)
   target_compile_definitions(test_${name} PRIVATE WIENERTREE_SOURCE_DIR="${PROJECT_SOURCE_DIR}")
   target_precompile_headers(test_${name} REUSE_FROM wienertree_test_prelude)
-  # Sanitizers are slow: statistics of the papers run without, and only what is threaded under the thread sanitizer.
+  # Sanitizers are slow: statistics of the papers run without, and under the thread sanitizer only cases tagged [threads].
   if((WIENERTREE_SANITIZE AND "papers" IN_LIST ARG_LABELS) OR
      (WIENERTREE_SANITIZE STREQUAL thread AND NOT "threads" IN_LIST ARG_LABELS))
     set_target_properties(test_${name} PROPERTIES EXCLUDE_FROM_ALL ON)
     return()
   endif()
-  add_test(NAME ${name} COMMAND test_${name})
+  set(cases)
+  if(WIENERTREE_SANITIZE STREQUAL thread)
+    set(cases -w NoTests "[threads]")
+  endif()
+  add_test(NAME ${name} COMMAND test_${name} ${cases})
   wienertree_known_leaks(${name})
   if(ARG_LABELS)
     set_tests_properties(${name} PROPERTIES LABELS "${ARG_LABELS}")

@@ -184,6 +184,16 @@ int ControlledFilter::answer_level() const {
   return level;
 }
 
+RowErrors ControlledFilter::difference_of_levels(int level) const {
+  const FinishedRun *answer = find(RunRole::level, level), *below = find(RunRole::level, level - 1);
+  if (alone() || below == nullptr || below->failed()) return {};
+  RowErrors errors = differences(answer->rows, below->rows);
+  // From one level of components to the next up to .55 of an error was left.
+  if (setup_.options.conditioning == Conditioning::components)
+    for (AnswerError& e : errors) e *= 1.2;
+  return errors;
+}
+
 RowErrors ControlledFilter::errors_of(int level) const {
   RowErrors errors;
   const FinishedRun* answer = find(RunRole::level, level);
@@ -202,11 +212,7 @@ RowErrors ControlledFilter::errors_of(int level) const {
   }
   const int guarded = alone() ? level : level - 1;
   const FinishedRun* below = find(RunRole::level, guarded);
-  if (below != nullptr && !below->failed() && below != answer)
-    errors = differences(answer->rows, below->rows);
-  // From one level of components to the next up to .55 of an error was left.
-  if (setup_.options.conditioning == Conditioning::components)
-    for (AnswerError& e : errors) e *= 1.2;
+  errors = difference_of_levels(level);
   for (const RunRole role : {RunRole::steps, RunRole::nodes, RunRole::degree, RunRole::rows}) {
     const FinishedRun* run = find(role, guarded);
     if (run == nullptr || run->failed() || below == nullptr || below->failed()) continue;
@@ -275,12 +281,13 @@ std::optional<ControlledFilter::Plan> ControlledFilter::next() const {
     if (!(top->failed() && below->failed()) && affordable(level + 1)) return plan(RunRole::level, level + 1);
     return {};
   }
-  const bool promising = largest(errors_of(level)).within(control_.tolerance), more = affordable(level + 1);
+  // Steps that are given leave an error that more nodes do nothing for; the guards tell it once, in the end.
+  const RowErrors by_levels = control_.steps ? difference_of_levels(level) : errors_of(level);
+  const bool promising = largest(by_levels).within(control_.tolerance), more = affordable(level + 1);
   if (!promising && more) return plan(RunRole::level, level + 1);
   // The best there will be: its guards, unless the work is spent.
   if (promising || work_ < control_.work)
     if (auto guard = next_guard(level - 1)) return guard;
-  // More nodes do nothing for what fixed steps leave.
   if (!control_.steps && more && !largest(errors_of(level)).within(control_.tolerance))
     return plan(RunRole::level, level + 1);
   return {};

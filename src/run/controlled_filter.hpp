@@ -109,6 +109,7 @@ class ControlledFilter {
   bool applies(RunRole role) const;
   const FinishedRun* find(RunRole role, int level) const;
   int answer_level() const;
+  RowErrors difference_of_levels(int level) const;  ///< from the level below; empty where there is none
   RowErrors errors_of(int level) const;
   bool affordable(int level) const;
   bool closed_form() const;

@@ -267,7 +267,7 @@ TEST_CASE("components: a nonlinear sensor of a Gaussian is conditioned as by a f
   CHECK(covariance(filter->posterior(), 0, 0) == Approx(second / mass).epsilon(0.02));
 }
 
-TEST_CASE("components: the same bytes for any number of threads, and after a checkpoint") {
+TEST_CASE("components: the same bytes for any number of threads, and after a checkpoint", "[threads]") {
   const Model model = double_well("h = [\"x\"]\nnoise = { law = \"student-t\", dof = 3, scale = 0.3 }\n");
   const Simulation drawn = simulate(model, 1.5, 300, 5, 5);
   const ObservationWindows windows(drawn.observations, model.observation, model.timing, 0);

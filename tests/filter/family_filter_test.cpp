@@ -250,7 +250,7 @@ TEST_CASE("a double well is the grid filter's") {
   check_against(model, path, FilterMethod::grid, 0.01);
 }
 
-TEST_CASE("the same bytes for any number of threads, and from a checkpoint") {
+TEST_CASE("the same bytes for any number of threads, and from a checkpoint", "[threads]") {
   const Model model = line_model("x - x^3", "0.6*sqrt(1 + x^2)", "h = [\"x\"]\n" + gaussian_noise(0.1));
   const ObservationPath path = record({0, 0.25, 0.5, 1.5, 1.75, 2.5}, {0.3, 0.6, missing, 0.9, 0.5, -0.6});
   for (const ThinningMethod thin : {ThinningMethod::recombination, ThinningMethod::tbba}) {

@@ -279,7 +279,8 @@ TEST_CASE("version 1 and version 2 weights agree within their Monte-Carlo error"
   CHECK(e1 < 0.02);
 }
 
-TEST_CASE("the same seed gives the same bytes for any number of threads, another seed does not") {
+TEST_CASE("the same seed gives the same bytes for any number of threads, another seed does not",
+          "[threads]") {
   const Model model = benes_cases[2].model();
   const auto path = simulate(model, 2, 2000, 2000, 2).observations;
   const ObservationWindows windows(path, model.observation, model.timing, 20);

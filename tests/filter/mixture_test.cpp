@@ -196,7 +196,8 @@ TEST_CASE("the mixture of a linear signal in three dimensions agrees with the Ka
   CHECK(se < 0.02);
 }
 
-TEST_CASE("the mixture gives the same bytes for any number of threads, and allocates nothing in a step") {
+TEST_CASE("the mixture gives the same bytes for any number of threads, and allocates nothing in a step",
+          "[threads]") {
   const Model model = benes_cases[3].model();
   const auto path = simulate(model, 2, 2000, 2000, 2).observations;
   const ObservationWindows windows(path, model.observation, model.timing, 20);

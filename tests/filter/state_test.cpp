@@ -88,7 +88,7 @@ covariance = [[0.3]]
 
 }  // namespace
 
-TEST_CASE("a tree with every thinning goes on with the same bytes") {
+TEST_CASE("a tree with every thinning goes on with the same bytes", "[threads]") {
   const Model model = benes_cases[2].model();
   for (const ThinningMethod thinning :
        {ThinningMethod::tbba, ThinningMethod::multinomial, ThinningMethod::residual,
@@ -110,7 +110,8 @@ TEST_CASE("a tree with every thinning goes on with the same bytes") {
   }
 }
 
-TEST_CASE("particles, Gaussians and weights that are never resampled go on with the same bytes") {
+TEST_CASE("particles, Gaussians and weights that are never resampled go on with the same bytes",
+          "[threads]") {
   const Model continuous = benes_cases[1].model(), discrete = parse_model(sv, "sv.toml");
   FilterOptions euler = with(FilterMethod::euler, 333);
   euler.thinning.method = ThinningMethod::systematic;
@@ -127,7 +128,7 @@ TEST_CASE("particles, Gaussians and weights that are never resampled go on with 
   check_resumed(discrete, with(FilterMethod::weighted, 100));
 }
 
-TEST_CASE("exact filters go on with the same bytes") {
+TEST_CASE("exact filters go on with the same bytes", "[threads]") {
   check_resumed(benes_cases[0].model(), with(FilterMethod::benes));
   check_resumed(benes_cases[0].model(), with(FilterMethod::grid));
   check_resumed(parse_model(sv, "sv.toml"), with(FilterMethod::grid));
@@ -141,7 +142,7 @@ TEST_CASE("exact filters go on with the same bytes") {
   }
 }
 
-TEST_CASE("bytes that are not the state of such a filter are refused") {
+TEST_CASE("bytes that are not the state of such a filter are refused", "[threads]") {
   const Model model = benes_cases[2].model();
   const auto small = make_filter(model, with(FilterMethod::euler, 10)),
              large = make_filter(model, with(FilterMethod::euler, 11));

@@ -7,7 +7,7 @@
 using namespace wienertree;
 using namespace wienertree::testing;
 
-TEST_CASE("loading and evaluating in parallel gives what one thread gives") {
+TEST_CASE("loading and evaluating in parallel gives what one thread gives", "[threads]") {
   const Model shared = load_model(bundled("heston"));
   const Point expected = field(*shared.fields, 0, {1.1, 0.08});
   std::vector<Point> seen(4);

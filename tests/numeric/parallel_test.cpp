@@ -13,7 +13,7 @@
 
 using namespace wienertree;
 
-TEST_CASE("Every task runs once, for any number of threads, round after round") {
+TEST_CASE("Every task runs once, for any number of threads, round after round", "[threads]") {
   for (const std::size_t threads : {1U, 2U, 3U, 8U}) {
     ThreadPool pool(threads);
     CHECK(pool.size() == threads);
@@ -30,7 +30,7 @@ TEST_CASE("Every task runs once, for any number of threads, round after round") 
   }
 }
 
-TEST_CASE("No two tasks share a thread number at one time") {
+TEST_CASE("No two tasks share a thread number at one time", "[threads]") {
   ThreadPool pool(4);
   std::vector<std::atomic<int>> busy(4);
   std::atomic<bool> shared{false};
@@ -41,7 +41,7 @@ TEST_CASE("No two tasks share a thread number at one time") {
   CHECK_FALSE(shared);
 }
 
-TEST_CASE("The exception of the lowest failing task comes out, and the pool lives on") {
+TEST_CASE("The exception of the lowest failing task comes out, and the pool lives on", "[threads]") {
   for (const std::size_t threads : {1U, 2U, 4U}) {
     ThreadPool pool(threads);
     for (int round = 0; round < 100; ++round) {
@@ -61,9 +61,9 @@ TEST_CASE("The exception of the lowest failing task comes out, and the pool live
   }
 }
 
-TEST_CASE("A pool needs a thread") { CHECK_THROWS_AS(ThreadPool(0), InputError); }
+TEST_CASE("A pool needs a thread", "[threads]") { CHECK_THROWS_AS(ThreadPool(0), InputError); }
 
-TEST_CASE("TBBA by blocks is TBBA, bit for bit") {
+TEST_CASE("TBBA by blocks is TBBA, bit for bit", "[threads]") {
   for (const std::size_t sites : {1U, 63U, 64U, 65U, 1000U, 20011U})
     for (const std::uint64_t N : {1ULL, 30ULL, 5000ULL, 100000ULL})
       for (const double spread : {0.0, 1.0, 20.0}) {

@@ -112,7 +112,7 @@ TEST_CASE("Children are branch-major, moved along their path, and weighted") {
   CHECK(grower.statistics().node_segments == 80 * 5);
 }
 
-TEST_CASE("The same bytes for any number of threads, failures included") {
+TEST_CASE("The same bytes for any number of threads, failures included", "[threads]") {
   const CubatureFormula formula = three_paths();
   const Generation parents = parents_of(20011, 3, true);
   Generation one, many;
@@ -175,7 +175,7 @@ TEST_CASE("A visitor sees every parent before its children, and every child move
   }
 }
 
-TEST_CASE("What a flow throws comes out of the growth") {
+TEST_CASE("What a flow throws comes out of the growth", "[threads]") {
   for (const std::size_t threads : {1U, 3U}) {
     TreeGrower grower(std::make_unique<Affine>(1.0), three_paths(), threads);
     Generation children;

@@ -130,7 +130,7 @@ TEST_CASE("in tree order only the chosen children are moved") {
   CHECK(all.ode_solves > 3 * 100 * 11);
 }
 
-TEST_CASE("a computation put down after any step is taken up to the same bytes") {
+TEST_CASE("a computation put down after any step is taken up to the same bytes", "[threads]") {
   const Model model = bent();
   for (const auto& [method, order] : {std::pair{ThinningMethod::recombination, SiteOrder::spatial},
                                       std::pair{ThinningMethod::tbba, SiteOrder::tree},
@@ -172,7 +172,7 @@ TEST_CASE("a computation put down after any step is taken up to the same bytes")
   }
 }
 
-TEST_CASE("any number of threads gives the same bytes") {
+TEST_CASE("any number of threads gives the same bytes", "[threads]") {
   const Model model = bent();
   for (const auto method : {ThinningMethod::none, ThinningMethod::tbba, ThinningMethod::recombination})
     for (const auto order : {SiteOrder::tree, SiteOrder::spatial}) {
