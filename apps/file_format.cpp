@@ -25,6 +25,7 @@ FileFormat model_format() {
               function_list() + ".\n",
           {{"At the top", "", text::model_keys},
            {"[state] NAME = { .. }", "", text::state_keys},
+           {"[noise]", "", text::brownian_keys},
            {"[observation]", "", text::observation_keys},
            {"[observation] noise = { .. }", "", text::noise_keys},
            {"[initial]", "", text::initial_keys},

@@ -96,6 +96,10 @@ std::string show_model(const std::string& name, const Assignments& parameters) {
       fmt::format("\nIto drift{}\n", a.convention == "ito" ? " (as given)" : "") + components(a, a.ito_drift);
   text += fmt::format("\nV_0, Stratonovich drift{}\n", a.convention == "ito" ? "" : " (as given)") +
           components(a, a.fields[0]);
+  if (!a.correlation.empty()) {
+    text += "\ncorrelation of the Brownian motions (V_1, V_2, .. are along independent ones)\n";
+    for (const auto& row : a.correlation) text += fmt::format("  {}\n", fmt::join(row, ", "));
+  }
   for (std::size_t k = 1; k < a.fields.size(); ++k)
     text += fmt::format("\nV_{}\n", k) + components(a, a.fields[k]);
   for (std::size_t k = 0; k < a.jacobians.size(); ++k)

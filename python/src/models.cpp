@@ -43,9 +43,9 @@ py::dict analysis_of(const PyModel& self) {
   py::dict brackets;
   for (const auto& b : a.brackets) brackets[py::make_tuple(b.i, b.j)] = b.components;
   using namespace py::literals;
-  return py::dict("states"_a = a.states, "convention"_a = a.convention, "ito_drift"_a = a.ito_drift,
-                  "fields"_a = a.fields, "jacobians"_a = a.jacobians, "brackets"_a = brackets,
-                  "sensor"_a = a.sensor, "sensor_derivative"_a = a.sensor_derivative,
+  return py::dict("states"_a = a.states, "convention"_a = a.convention, "correlation"_a = a.correlation,
+                  "ito_drift"_a = a.ito_drift, "fields"_a = a.fields, "jacobians"_a = a.jacobians,
+                  "brackets"_a = brackets, "sensor"_a = a.sensor, "sensor_derivative"_a = a.sensor_derivative,
                   "log_likelihood"_a = a.log_likelihood, "affine_fields"_a = a.affine_fields,
                   "has_exact_flow"_a = a.has_exact_flow, "exact_filter"_a = a.exact_filter_name,
                   "exact_filter_reason"_a = a.exact_filter_reason, "square_roots"_a = a.square_roots,

@@ -68,7 +68,7 @@ TextModel TextModel::parse(std::string_view toml, const std::string& origin,
 // The model from source and parameters.
 std::shared_ptr<TextModel::Contents> TextModel::build(Contents contents) {
   const text::ModelSource& source = contents.source;
-  const text::SymbolicModel symbolic = text::derive(source, false);
+  const text::SymbolicModel symbolic = text::derive(source, contents.parameters, false);
   text::Arena arena;
   const text::FieldExpressions bound =
       text::substitute(symbolic.coefficients, source, contents.parameters, arena);
@@ -125,7 +125,7 @@ Model TextModel::with_brackets(const std::vector<std::pair<std::size_t, std::siz
   text::ModelSource source = contents_->source;
   source.observation = {};
   source.exact.reset();
-  const text::SymbolicModel symbolic = text::derive(source, false, brackets);
+  const text::SymbolicModel symbolic = text::derive(source, contents_->parameters, false, brackets);
   text::Arena arena;
   const text::FieldExpressions bound =
       text::substitute(symbolic.coefficients, source, contents_->parameters, arena);
@@ -138,7 +138,7 @@ const Model& TextModel::model() const { return contents_->model; }
 
 ModelAnalysis TextModel::analysis() const {
   const Model& model = contents_->model;
-  const text::SymbolicModel symbolic = text::derive(contents_->source, true);
+  const text::SymbolicModel symbolic = text::derive(contents_->source, contents_->parameters, true);
   const text::FieldExpressions& c = symbolic.coefficients;
   ModelAnalysis result;
   result.name = model.name;
@@ -146,6 +146,7 @@ ModelAnalysis TextModel::analysis() const {
   result.states = model.state_names;
   result.has_clock = model.has_clock;
   result.parameters = model.parameters;
+  result.correlation = printed(c.correlation);
   result.ito_drift = printed(c.ito_drift);
   result.fields = printed(c.fields);
   result.jacobians = printed(c.jacobians);

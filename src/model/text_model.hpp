@@ -39,13 +39,15 @@ struct ModelAnalysis {
   std::vector<std::string> states;  ///< d names, the last one "t" when `has_clock`
   bool has_clock = false;
   std::vector<std::pair<std::string, double>> parameters;  ///< after overrides
-  std::vector<std::string> ito_drift;                      ///< V~_0, d
-  std::vector<std::vector<std::string>> fields;            ///< V_0 (Stratonovich), V_1 .. V_p, d each
-  std::vector<std::vector<std::string>> jacobians;         ///< of V_0 .. V_p; entry i*d + l is dV^i/dx_l
-  std::vector<Bracket> brackets;                           ///< [V_i, V_j] = (DV_j) V_i - (DV_i) V_j
-  std::vector<std::string> sensor;                         ///< h, k
-  std::vector<std::string> sensor_derivative;              ///< entry i*p + r-1 is V_r h_i
-  std::string log_likelihood;                              ///< empty when the model has none
+  /// Of the Brownian motions of the file, p x p; V_1 .. V_p are along independent ones. Empty: they are these.
+  std::vector<std::vector<std::string>> correlation;
+  std::vector<std::string> ito_drift;               ///< V~_0, d
+  std::vector<std::vector<std::string>> fields;     ///< V_0 (Stratonovich), V_1 .. V_p, d each
+  std::vector<std::vector<std::string>> jacobians;  ///< of V_0 .. V_p; entry i*d + l is dV^i/dx_l
+  std::vector<Bracket> brackets;                    ///< [V_i, V_j] = (DV_j) V_i - (DV_i) V_j
+  std::vector<std::string> sensor;                  ///< h, k
+  std::vector<std::string> sensor_derivative;       ///< entry i*p + r-1 is V_r h_i
+  std::string log_likelihood;                       ///< empty when the model has none
   bool affine_fields = false, affine_sensor = false, has_exact_flow = false;
   ExactFilter exact_filter = ExactFilter::none;
   std::string exact_filter_name;    ///< "benes", "kalman-bucy", "kalman", "none"

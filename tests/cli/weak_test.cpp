@@ -208,6 +208,31 @@ TEST_CASE("weak: Jacobi's diffusion by its exact transition, whether or not it r
         Approx(0.21 * std::exp(-1)).epsilon(1e-12));
 }
 
+TEST_CASE("weak: Heston's model with a correlation has the price of the factor written by hand") {
+  const Workplace place;
+  const auto model = [&](const std::string& file, const std::string& v, const std::string& more) {
+    place.write(file,
+                "name = \"heston\"\nconvention = \"ito\"\n[parameters]\nrho = -0.5\n[state]\n"
+                "s = { initial = 100 }\nv = { initial = 0.04, lower = 0 }\n[drift]\ns = \"0.02*s\"\n"
+                "v = \"1.5*(0.05 - v)\"\n[diffusion]\ns = [\"sqrt(v)*s\", 0]\nv = " +
+                    v + "\n" + more);
+  };
+  model("correlated.toml", "[0, \"0.4*sqrt(v)\"]", "[noise]\ncorrelation = [[1, \"rho\"], [\"rho\", 1]]\n");
+  model("by-hand.toml", "[\"0.4*rho*sqrt(v)\", \"0.4*sqrt((1 - rho^2)*v)\"]", "");
+  const std::string question = " --horizon 0.75 --steps 16 --degree 7 --payoff max(s-105,0)";
+  const double correlated = value_of(place, "correlated.toml" + question);
+  // Heston (1993) by quadrature of his characteristic function, undiscounted.
+  CHECK(correlated == Approx(5.2197880099).margin(2e-5));
+  CHECK(correlated == Approx(value_of(place, "by-hand.toml" + question)).epsilon(1e-12));
+  // Without its transition, by flows.
+  const std::string flows = question + " --square-roots off --nodes 300";
+  CHECK(value_of(place, "correlated.toml" + flows) ==
+        Approx(value_of(place, "by-hand.toml" + flows)).epsilon(1e-9));
+  const std::string shown = place.run("model show correlated.toml").out;
+  CHECK_THAT(shown, Catch::Contains("correlation of the Brownian motions") && Catch::Contains("  rho, 1\n") &&
+                        Catch::Contains("exact transition: s is lognormal given these"));
+}
+
 TEST_CASE("weak: several horizons and payoffs from one tree") {
   const Workplace place;
   const auto rows = rows_of(place,

@@ -210,6 +210,9 @@ def option_cases():
                 base = {"--horizon": "1", "--steps": "10", "--observations": "-"}
                 base[option] = value
                 yield Case(f"simulate {option} {value!r}", ["simulate", "m.toml", *[word for pair in base.items() for word in pair]], {"m.toml": MODEL})
+    for rows in ["[[1]]", "[[2]]", "[[1, 0], [0, 1]]", "[]", "[[]]", "1", '[["x"]]', '[["1/0"]]', "[[nan]]", "[[" + "1," * 100000 + "1]]"]:
+        codes = (0,) if rows == "[[1]]" else (2,)
+        yield Case(f"correlation {rows[:20]}", ["model", "show", "m.toml"], {"m.toml": MODEL + f"[noise]\ncorrelation = {rows}\n"}, codes=codes)
     for words in [[], ["--help"], ["nonsense"], ["filter"], ["filter", "m.toml"], ["filter", "nonsense", "--observations", "Y.csv"], ["format"], ["format", "nonsense"], ["model"], ["model", "show"], ["model", "show", "../../../etc/passwd"],
                   ["study"], ["study", "nonsense"], ["study", "cpu"], ["formulas", "show", "../benes"], ["tree", "benes"], ["tree", "benes", "--steps", "1000000", "--horizon", "1", "--dot", "-"], ["compare", "benes"], ["completion", "nonsense"],
                   ["filter", "A" * 10000, "--observations", "Y.csv"], ["filter", "m.toml", "--observations", "Y.csv", "--output", "no/such/folder/x.csv"], ["filter", "m.toml", "--observations", "Y.csv", "--output", "A" * 300],

@@ -54,6 +54,24 @@ def test_what_a_model_says_of_itself():
     assert len(benes["fields"]) == 2
 
 
+def test_correlated_brownian_motions():
+    model = {
+        "convention": "ito",
+        "parameters": {"rho": 0.5},
+        "state": {"x": {"initial": 0.0}, "y": {"initial": 0.0}},
+        "drift": {"x": 0, "y": 0},
+        "diffusion": {"x": ["1", "0"], "y": ["0", "2"]},
+        "noise": {"correlation": [[1, "rho"], ["rho", 1]]},
+    }
+    shown = wt.Model(model).analysis()
+    assert shown["correlation"] == [["1", "rho"], ["rho", "1"]]
+    assert wt.Model("heston").analysis()["correlation"] == []
+    # E[x y] = rho 2 T
+    assert wt.weak(model, "x*y", horizon=3.0, steps=2).value == pytest.approx(3.0, rel=1e-12)
+    with pytest.raises(wt.InputError, match="between -1 and 1"):
+        wt.Model(model, set={"rho": 1.5})
+
+
 def test_parameters_are_replaced():
     model = wt.Model(OU, set={"theta": 2})
     assert model.parameters == {"theta": 2}

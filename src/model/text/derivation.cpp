@@ -1,5 +1,10 @@
-#include <algorithm>
+#include <fmt/format.h>
 
+#include <algorithm>
+#include <cmath>
+
+#include "wienertree/model/text/checked_algebra.hpp"
+#include "wienertree/model/text/correlation.hpp"
 #include "wienertree/model/text/field_expressions.hpp"
 #include "wienertree/model/text/parse_in_place.hpp"
 #include "wienertree/model/text/symbolic_size.hpp"
@@ -35,8 +40,9 @@ std::size_t expanded_terms(const ex& e, std::size_t limit) {
 
 class Derivation {
  public:
-  explicit Derivation(const ModelSource& source)
+  Derivation(const ModelSource& source, const BrownianCorrelation& correlation)
       : source_(source),
+        correlation_(correlation),
         symbols_(symbols_of(source)),
         scope_{symbols_, source.parameters.size(), true, false} {}
 
@@ -63,11 +69,68 @@ class Derivation {
     diffusion_.assign(p_, exvector(d_));
     for (std::size_t i = 0; i < d_; ++i)
       for (std::size_t j = 0; j < p_; ++j) diffusion_[j][i] = parse(source_.diffusion[i][j], scope_);
+    if (!source_.correlation.empty()) make_independent();
     for (const SourceExpression& h : source_.observation.h) sensor_.push_back(parse(h, scope_));
     if (source_.observation.log_likelihood) {
       Scope with_observations = scope_;
       with_observations.observations = true;
       log_likelihood_ = parse(*source_.observation.log_likelihood, with_observations);
+    }
+  }
+
+  // The entries of R, as expressions of the parameters.
+  std::vector<exvector> correlation_entries() {
+    Scope numbers = scope_;
+    numbers.states = false;
+    std::vector<exvector> R(p_, exvector(p_));
+    for (std::size_t j = 0; j < p_; ++j)
+      for (std::size_t k = 0; k < p_; ++k) R[j][k] = parse(source_.correlation[j][k], numbers);
+    return R;
+  }
+
+  // L as in correlation.hpp. With more than `most_symbolic` Brownian motions its expressions would grow beyond
+  // reading: then its numbers.
+  std::vector<exvector> correlation_factor(const std::vector<exvector>& R) const {
+    constexpr std::size_t most_symbolic = 3;
+    std::vector<exvector> L(p_, exvector(p_)), M = L;
+    exvector D(p_);
+    for (std::size_t k = 0; k < p_; ++k) {
+      if (!correlation_.present[k]) continue;
+      if (p_ > most_symbolic) {
+        for (std::size_t j = k; j < p_; ++j) {
+          const double value =
+              correlation_.factor(static_cast<Eigen::Index>(j), static_cast<Eigen::Index>(k));
+          L[j][k] = exact_number(fmt::format("{:.17g}", std::abs(value))) * (value < 0 ? -1 : 1);
+        }
+        continue;
+      }
+      D[k] = 1;
+      for (std::size_t m = 0; m < k; ++m) D[k] -= GiNaC::pow(M[k][m], 2) * D[m];
+      D[k] = D[k].normal();
+      M[k][k] = 1;
+      for (std::size_t j = k + 1; j < p_; ++j) {
+        M[j][k] = R[j][k];
+        for (std::size_t m = 0; m < k; ++m) M[j][k] -= M[j][m] * M[k][m] * D[m];
+        M[j][k] = (M[j][k] / D[k]).normal();
+      }
+      for (std::size_t j = k; j < p_; ++j) L[j][k] = M[j][k] * GiNaC::sqrt(D[k]);
+    }
+    return L;
+  }
+
+  // The fields along independent Brownian motions, V_k = sum_j V^W_j L_jk.
+  void make_independent() {
+    const SourceExpression& place = source_.correlation[0][0];
+    const std::vector<exvector> R = correlation_entries();
+    const std::vector<exvector> L = at_place(place, [&] { return correlation_factor(R); });
+    std::vector<exvector> independent(p_, exvector(d_));
+    for (std::size_t k = 0; k < p_; ++k)
+      for (std::size_t i = 0; i < d_; ++i)
+        for (std::size_t j = k; j < p_; ++j) independent[k][i] += diffusion_[j][i] * L[j][k];
+    diffusion_ = std::move(independent);
+    for (std::size_t j = 0; j < p_; ++j) {
+      auto& row = result_.coefficients.correlation.emplace_back();
+      for (std::size_t k = 0; k < p_; ++k) row.push_back(converted(R[j][k], source_.correlation[j][k]));
     }
   }
 
@@ -205,6 +268,7 @@ class Derivation {
   }
 
   const ModelSource& source_;
+  const BrownianCorrelation& correlation_;
   Symbols symbols_;
   Scope scope_;
   SymbolicBudget budget_;
@@ -217,10 +281,11 @@ class Derivation {
 
 }  // namespace
 
-SymbolicModel derive(const ModelSource& source, bool with_brackets,
+SymbolicModel derive(const ModelSource& source, const std::vector<double>& parameters, bool with_brackets,
                      const std::vector<std::pair<std::size_t, std::size_t>>& further) {
+  const BrownianCorrelation correlation = brownian_correlation(source, parameters);
   const std::lock_guard lock(symbolic_mutex());
-  return Derivation(source)(with_brackets, further);
+  return Derivation(source, correlation)(with_brackets, further);
 }
 
 }  // namespace wienertree::text

@@ -23,7 +23,8 @@ struct FieldExpressions {
   std::vector<Expression> sensor_gradient;         ///< entry i*d + l is dh_i/dx_l
   std::vector<Expression> sensor_derivative;       ///< entry i*p + r-1 is V_r h_i
   std::optional<Expression> log_likelihood;
-  std::size_t observation_components = 0;  ///< y1 .. yk in `log_likelihood`
+  std::vector<std::vector<Expression>> correlation;  ///< of the Brownian motions as given; empty: independent
+  std::size_t observation_components = 0;            ///< y1 .. yk in `log_likelihood`
 
   std::size_t sensor_dimension() const { return sensor.size(); }
 };
@@ -41,9 +42,10 @@ struct SymbolicModel {
 };
 
 /// `further` fields are brackets of pairs, V_{p+1} = [V_i, V_j] with (i, j) = further[0] and so on, of the
-/// model's fields or further ones before it; `coefficients.p` counts them.
+/// model's fields or further ones before it; `coefficients.p` counts them. The values of the parameters decide
+/// which columns a correlation of the Brownian motions leaves out (correlation.hpp).
 /// @throws InputError naming the place in the source
-SymbolicModel derive(const ModelSource& source, bool with_brackets,
+SymbolicModel derive(const ModelSource& source, const std::vector<double>& parameters, bool with_brackets,
                      const std::vector<std::pair<std::size_t, std::size_t>>& further = {});
 
 /// The coefficients with the parameters replaced by their values.

@@ -6,13 +6,14 @@
 
 namespace wienertree::text {
 
-inline constexpr std::array<FileKey, 9> model_keys{{
+inline constexpr std::array<FileKey, 10> model_keys{{
     {"name", "text", "the file's name", "what the model is called"},
     {"convention", "\"ito\" or \"stratonovich\"", "required", "how [drift] is meant"},
     {"parameters", "NAME = number or expression", "none", "of the parameters above it; --set changes them"},
     {"state", "NAME = table", "required", "a component each, in the order of the file"},
     {"drift", "STATE = expression", "required", "one for each state"},
     {"diffusion", "STATE = list of expressions", "required", "for each state one for each Brownian motion"},
+    {"noise", "table", "independent", "how the Brownian motions are correlated"},
     {"observation", "table", "nothing is observed", "what is observed of the signal"},
     {"initial", "table", "a fixed start", "a Gaussian start"},
     {"exact", "table", "found out", "an exact filter that the model is claimed to have, which is checked"},
@@ -23,6 +24,11 @@ inline constexpr std::array<FileKey, 4> state_keys{{
     {"lower", "expression", "unbounded", "least value"},
     {"upper", "expression", "unbounded", "largest value"},
     {"boundary", "\"error\", \"clamp\" or \"absorb\"", "error", "what a node does that leaves the bounds"},
+}};
+
+inline constexpr std::array<FileKey, 1> brownian_keys{{
+    {"correlation", "list of lists of expressions", "required",
+     "of the parameters, a row for each Brownian motion: of those that the columns of [diffusion] refer to"},
 }};
 
 inline constexpr std::array<FileKey, 5> observation_keys{{

@@ -88,6 +88,20 @@ void read_dynamics(const Section& root, ModelSource& model) {
   }
 }
 
+std::vector<std::vector<SourceExpression>> read_correlation(const Section& section, std::size_t p) {
+  section.only(brownian_keys);
+  std::vector<std::vector<SourceExpression>> rows = section.matrix("correlation");
+  const std::string place = section.location("correlation").text();
+  if (rows.size() != p)
+    throw InputError(fmt::format("needs {} rows, one per Brownian motion", p), place,
+                     std::to_string(rows.size()));
+  for (const auto& row : rows)
+    if (row.size() != p)
+      throw InputError(fmt::format("needs {} entries in every row, one per Brownian motion", p), place,
+                       std::to_string(row.size()));
+  return rows;
+}
+
 NoiseSource read_noise(const Section& section) {
   section.only(noise_keys);
   std::vector<std::string> names;
@@ -186,6 +200,7 @@ ModelSource read(const toml::table& table, const TomlFile& file) {
   if (root.has("parameters")) model.parameters = read_parameters(root.section("parameters"));
   model.states = read_states(root.section("state"), model.parameters);
   read_dynamics(root, model);
+  if (root.has("noise")) model.correlation = read_correlation(root.section("noise"), model.noise_dimension());
   if (root.has("observation")) model.observation = read_observation(root.section("observation"));
   if (root.has("initial")) model.initial = read_initial(root.section("initial"), model.states.size());
   if (root.has("exact")) model.exact = read_exact(root.section("exact"));

@@ -70,6 +70,8 @@ struct ModelSource {
   std::vector<StateSource> states;                       ///< d
   std::vector<SourceExpression> drift;                   ///< d
   std::vector<std::vector<SourceExpression>> diffusion;  ///< d lists of p
+  /// Of the Brownian motions that the columns of `diffusion` refer to, p lists of p; empty: independent.
+  std::vector<std::vector<SourceExpression>> correlation;
   ObservationSource observation;
   std::optional<InitialSource> initial;
   std::optional<ExactClaim> exact;
