@@ -11,6 +11,7 @@
 #include "compare_plot.hpp"
 #include "compare_run.hpp"
 #include "data_directory.hpp"
+#include "input_files.hpp"
 #include "output.hpp"
 #include "standard_input.hpp"
 #include "wienertree/cubature/formula_file.hpp"
@@ -27,7 +28,7 @@ struct CompareArguments {
   std::vector<std::string> models;
   FilterArguments filter;
   Assignments parameters;
-  std::optional<std::string> observations, output, plot;
+  std::optional<std::string> observations, inputs, output, plot;
   std::optional<TableFormat> format;
   std::optional<std::uint64_t> steps;
   AccuracyArguments accuracy;
@@ -62,12 +63,17 @@ std::vector<Contender> contenders(const CompareArguments& a) {
                      "compare");
   std::vector<Contender> all;
   std::set<std::string> labels;
+  bool given = false;
   for (const std::string& text : a.models) {
     if (!labels.insert(text).second) throw InputError("is given twice", "compare", text);
     const ModelArgument argument = parse_model_argument(text);
     Assignments parameters = a.parameters;
     parameters.insert(parameters.end(), argument.parameters.begin(), argument.parameters.end());
-    Model model = load_model(model_file(argument.name).string(), parameters);
+    const TextModel source = TextModel::load(model_file(argument.name).string(), parameters);
+    // A file of inputs is for those that have some.
+    Model model =
+        with_inputs(source, source.model().inputs ? a.inputs : std::nullopt, a.observations).model();
+    given = given || model.inputs;
     if (model.observation == ObservationKind::none)
       throw InputError("the model has no [observation]: there is no evidence", "model " + text);
     if (!all.empty() && (model.observation != all.front().model.observation ||
@@ -77,6 +83,7 @@ std::vector<Contender> contenders(const CompareArguments& a) {
     all.push_back({text, argument.name, std::move(model), {}});
     all.back().setup = filter_setup(a.filter, all.back().model);
   }
+  if (a.inputs && !given) throw InputError("no model has [inputs]", "--inputs", *a.inputs);
   return all;
 }
 
@@ -186,8 +193,8 @@ Json identity_of(const std::vector<Contender>& all, const WindowSource& windows,
 }
 
 void compare_and_write(const CompareArguments& a) {
-  std::vector<Contender> all = contenders(a);
   if (*a.observations == "-") throw InputError("needs a file: every model reads it", "--observations", "-");
+  std::vector<Contender> all = contenders(a);
   std::optional<Picture> picture;
   std::optional<OutputFile> plot;
   if (a.plot) {
@@ -228,6 +235,7 @@ void add_compare_command(CLI::App& program) {
                  "Bundled models or TOML files; MODEL:NAME=VALUE,.. sets parameters of this one")
       ->required();
   add_text(app, "--observations", a->observations, "FILE", "CSV with header t,y1,..")->required();
+  add_inputs(app, a->inputs);
   add_record_steps(app, a->steps);
   add_filter_options(app, a->filter);
   add_assignments(app, a->parameters);

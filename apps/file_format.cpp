@@ -25,6 +25,7 @@ FileFormat model_format() {
               function_list() + ".\n",
           {{"At the top", "", text::model_keys},
            {"[state] NAME = { .. }", "", text::state_keys},
+           {"[inputs] NAME = { .. }", "", text::input_keys},
            {"[noise]", "", text::brownian_keys},
            {"[observation]", "", text::observation_keys},
            {"[observation] noise = { .. }", "", text::noise_keys},
@@ -82,7 +83,9 @@ FileFormat observations_format() {
           "the start is that of the state at the first row. Continuous observations: rows are the path of "
           "Y, the first one\n"
           "its start, and no value is missing. Discrete ones: every row is an observation, an empty field "
-          "a missing value.\n"
+          "a missing value. Beside them may stand the inputs of a model, in any order; --inputs takes them "
+          "from a file\n"
+          "of their own, with the header t,NAME[,NAME..].\n"
           "Files of signals have the header t,<state>[,<state>..] instead.\n",
           {},
           "t,y1\n0,0\n0.25,0.1043\n0.5,-0.2218\n0.75,-0.1509\n1,0.0381\n"};

@@ -10,6 +10,7 @@
 #include "filter_arguments.hpp"
 #include "filter_report.hpp"
 #include "filter_table.hpp"
+#include "input_files.hpp"
 #include "output.hpp"
 #include "signal_file.hpp"
 #include "standard_input.hpp"
@@ -26,7 +27,7 @@ struct FilterCommandArguments {
   std::string model;
   Assignments parameters;
   FilterArguments filter;
-  std::optional<std::string> observations, signal, output, plot;
+  std::optional<std::string> observations, inputs, signal, output, plot;
   std::optional<TableFormat> format;
   std::optional<std::uint64_t> moments, steps;
   std::optional<double> density_at;
@@ -94,9 +95,11 @@ Json identity_of(const FilterCommandArguments& a, const FilterContext& c, bool f
 
 void filter_and_write(const FilterCommandArguments& a) {
   const auto began = std::chrono::steady_clock::now();
-  const Model model = load_model(model_file(a.model).string(), a.parameters);
-  if (model.observation == ObservationKind::none)
-    throw InputError("the model has no [observation]: there is nothing to filter by", "model " + model.name);
+  const TextModel source = TextModel::load(model_file(a.model).string(), a.parameters);
+  if (source.model().observation == ObservationKind::none)
+    throw InputError("the model has no [observation]: there is nothing to filter by",
+                     "model " + source.model().name);
+  const Model model = with_inputs(source, a.inputs, a.observations).model();
   const FilterSetup setup = filter_setup(a.filter, model);
   if (a.density_at && !a.plot)
     throw InputError("is drawn to the file of --plot, which is missing", "--density-at");
@@ -160,6 +163,7 @@ void add_filter_command(CLI::App& program) {
   add_text(app, "--observations,OBSERVATIONS", a->observations, "FILE",
            "CSV with header t,y1,..; - is standard input, row by row")
       ->required();
+  add_inputs(app, a->inputs);
   add_record_steps(app, a->steps);
   add_filter_options(app, a->filter);
   add_assignments(app, a->parameters);

@@ -81,6 +81,10 @@ std::string show_model(const std::string& name, const Assignments& parameters) {
   text += "\nparameters\n";
   if (a.parameters.empty()) text += "  none\n";
   for (const auto& [parameter, value] : a.parameters) text += fmt::format("  {} = {}\n", parameter, value);
+  if (!a.inputs.empty()) text += "\ninputs, functions of time from a file (u' is the slope of u)\n";
+  for (const auto& [input, between] : a.inputs)
+    text += fmt::format("  {}: {}\n", input,
+                        between == Between::linear ? "linear between its times" : "its previous value");
   text += "\nstart\n";
   for (std::size_t i = 0; i < model.reported_dimension(); ++i) {
     text += fmt::format("  {} = {}", a.states[i], model.initial[i]);

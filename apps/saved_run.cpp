@@ -33,6 +33,13 @@ Json model_identity(const std::string& name, const Model& model) {
   identity["model"] = model.name;
   identity["model file's checksum"] = checksum_text(text.str());
   for (const auto& [parameter, value] : model.parameters) identity["parameters"][parameter] = value;
+  const auto bytes = [](const std::vector<double>& numbers) {
+    return std::string_view(reinterpret_cast<const char*>(numbers.data()), numbers.size() * sizeof(double));
+  };
+  if (model.inputs)
+    for (const InputFunction& f : model.inputs->functions())
+      identity["checksums of inputs"][f.name] =
+          checksum_text(bytes(f.times)) + " " + checksum_text(bytes(f.values));
   return identity;
 }
 

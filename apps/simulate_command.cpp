@@ -4,6 +4,7 @@
 #include "command_line.hpp"
 #include "commands.hpp"
 #include "data_directory.hpp"
+#include "input_files.hpp"
 #include "output.hpp"
 #include "signal_file.hpp"
 #include "wienertree/filter/simulate.hpp"
@@ -17,11 +18,12 @@ struct SimulateArguments {
   Assignments parameters;
   std::optional<double> horizon;
   std::optional<std::uint64_t> steps, seed, keep;
-  std::optional<std::string> observations, signal;
+  std::optional<std::string> observations, signal, inputs;
 };
 
 void simulate_and_write(const SimulateArguments& a) {
-  const Model model = load_model(model_file(a.model).string(), a.parameters);
+  const Model model =
+      with_inputs(TextModel::load(model_file(a.model).string(), a.parameters), a.inputs).model();
   if (a.observations && model.observation == ObservationKind::none)
     throw InputError("the model has no [observation]: only --signal can be written", "--observations",
                      model.name);
@@ -59,6 +61,7 @@ void add_simulate_command(CLI::App& program) {
   add_text(app, "--observations", a->observations, "FILE",
            "Observations as CSV: t,y1,..; - is standard output");
   add_text(app, "--signal", a->signal, "FILE", "The signal as CSV: t,<state>,..; - is standard output");
+  add_inputs(app, a->inputs);
   add_memory_limit(app);
   add_assignments(app, a->parameters);
   app.footer(

@@ -11,6 +11,7 @@
 #include "commands.hpp"
 #include "data_directory.hpp"
 #include "filter_arguments.hpp"
+#include "input_files.hpp"
 #include "output.hpp"
 #include "standard_input.hpp"
 #include "tree_plot.hpp"
@@ -135,6 +136,7 @@ std::string summary(const Genealogy& genealogy) {
 
 void write_tree(const TreeArguments& a) {
   Model model = load_model(model_file(a.model).string(), a.parameters);
+  refuse_inputs(model, "the tree that is drawn");
   if (!a.dot && !a.graphml && !a.plot)
     throw InputError("give one of --plot, --dot and --graphml, or several", "tree");
   if (a.horizon.has_value() == a.observations.has_value())

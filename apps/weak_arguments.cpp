@@ -8,6 +8,7 @@
 
 #include "data_directory.hpp"
 #include "formula_choice.hpp"
+#include "input_files.hpp"
 #include "tree_choices.hpp"
 #include "wienertree/cubature/lie_formula.hpp"
 #include "wienertree/tree/jacobi_transition.hpp"
@@ -219,12 +220,13 @@ void use_exact_transition(const WeakArguments& a, WeakProblem& problem) {
 }  // namespace
 
 WeakProblem weak_problem(const WeakArguments& a) {
-  return weak_problem(a, TextModel::load(model_file(a.model).string(), a.parameters));
+  return weak_problem(a, with_inputs(TextModel::load(model_file(a.model).string(), a.parameters), a.inputs));
 }
 
 WeakProblem weak_problem(const WeakArguments& a, const TextModel& model) {
   if (a.kink_width && *a.kink_width < 0)
     throw InputError("must not be negative", "--kink-width", fmt::format("{}", *a.kink_width));
+  if (model.model().inputs) model.model().inputs->require_known();
   if (a.payoffs.empty()) throw InputError("is needed at least once", "--payoff");
   if (a.horizons.size() > 1 && !a.averages.empty())
     throw InputError("has one time to divide by, not several: take --integral", "--average",
@@ -379,6 +381,7 @@ WeakRun weak_run(const WeakArguments& a, const WeakProblem& problem, CubatureFor
   run.grid = a.grid.value_or(GridKind::uniform);
   run.horizon = a.horizon();
   if (a.horizons.size() > 1) run.horizons = a.horizons;
+  run.jumps = jumps_inside(model, run.horizon);
   run.steps = a.steps.value_or(0);
   run.gamma = a.gamma.value_or(o.formula.degree);
   run.launches = static_cast<std::uint32_t>(a.launches.value_or(1));

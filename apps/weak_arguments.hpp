@@ -28,6 +28,8 @@ struct WeakArguments {
   Assignments parameters;
   std::vector<std::string> payoffs, averages, integrals;
   std::optional<std::string> discount, formula;
+  std::optional<std::string>
+      inputs;                    ///< the file of the model's functions of time; of the command weak alone
   std::vector<double> horizons;  ///< ascending
   std::optional<double> gamma, patch_width, relative_tolerance, absolute_tolerance, tolerance, kink_width;
   std::optional<std::uint64_t> steps, degree, nodes, seed, launches, threads, recombination_degree;

@@ -7,6 +7,7 @@
 #include <memory>
 
 #include "commands.hpp"
+#include "input_files.hpp"
 #include "output.hpp"
 #include "progress.hpp"
 #include "saved_run.hpp"
@@ -169,6 +170,7 @@ void add_weak_command(CLI::App& program) {
   CLI::App& app = *program.add_subcommand("weak", "Averages of payoffs at a time: weak approximation");
   const auto a = std::make_shared<WeakCommandArguments>();
   add_weak_options(app, a->weak);
+  add_inputs(app, a->weak.inputs);
   add_text(app, "--output", a->output, "FILE", "Where the table goes [standard output]");
   add_choice(app, "--format", a->format, formats, "Of the table [csv]");
   add_checkpoint_options(app, a->saving);

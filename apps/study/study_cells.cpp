@@ -10,6 +10,7 @@
 #include <set>
 
 #include "../data_directory.hpp"
+#include "../input_files.hpp"
 #include "wienertree/model/text/printable.hpp"
 #include "wienertree/model/text_model.hpp"
 
@@ -139,6 +140,7 @@ std::shared_ptr<const Model> ModelShelf::get(const std::string& name, const Assi
   for (const auto& [known, model] : models_)
     if (known == key) return model;
   models_.emplace_back(key, std::make_shared<const Model>(load_model(model_file(name).string(), parameters)));
+  refuse_inputs(*models_.back().second, "a study");
   return models_.back().second;
 }
 
@@ -187,7 +189,9 @@ WeakCell parse_weak_cell(const CellOptions& options, const ModelShelf& models, c
     add_weak_options(app, a);
     parse_words(app, command_words(app, options, models));
     if (!a.threads) a.threads = 1;
-    WeakProblem problem = weak_problem(a);
+    const TextModel source = TextModel::load(model_file(a.model).string(), a.parameters);
+    refuse_inputs(source.model(), "a study");
+    WeakProblem problem = weak_problem(a, source);
     WeakCell cell{a, std::move(problem), {}};
     if (!a.tolerance) {
       cell.driven = weak_formula(cell.arguments, cell.problem);

@@ -40,16 +40,18 @@ std::vector<std::string> states_of(const Model& model) {
 
 py::dict analysis_of(const PyModel& self) {
   const ModelAnalysis a = self.text().analysis();
-  py::dict brackets;
+  py::dict brackets, inputs;
+  for (const auto& [name, between] : a.inputs)
+    inputs[py::str(name)] = between == Between::linear ? "linear" : "previous";
   for (const auto& b : a.brackets) brackets[py::make_tuple(b.i, b.j)] = b.components;
   using namespace py::literals;
   return py::dict("states"_a = a.states, "convention"_a = a.convention, "correlation"_a = a.correlation,
-                  "ito_drift"_a = a.ito_drift, "fields"_a = a.fields, "jacobians"_a = a.jacobians,
-                  "brackets"_a = brackets, "sensor"_a = a.sensor, "sensor_derivative"_a = a.sensor_derivative,
-                  "log_likelihood"_a = a.log_likelihood, "affine_fields"_a = a.affine_fields,
-                  "has_exact_flow"_a = a.has_exact_flow, "exact_filter"_a = a.exact_filter_name,
-                  "exact_filter_reason"_a = a.exact_filter_reason, "square_roots"_a = a.square_roots,
-                  "square_roots_reason"_a = a.square_roots_reason);
+                  "inputs"_a = inputs, "ito_drift"_a = a.ito_drift, "fields"_a = a.fields,
+                  "jacobians"_a = a.jacobians, "brackets"_a = brackets, "sensor"_a = a.sensor,
+                  "sensor_derivative"_a = a.sensor_derivative, "log_likelihood"_a = a.log_likelihood,
+                  "affine_fields"_a = a.affine_fields, "has_exact_flow"_a = a.has_exact_flow,
+                  "exact_filter"_a = a.exact_filter_name, "exact_filter_reason"_a = a.exact_filter_reason,
+                  "square_roots"_a = a.square_roots, "square_roots_reason"_a = a.square_roots_reason);
 }
 
 std::string shown(const PyModel& self) {
@@ -75,11 +77,36 @@ py::object simulate_model(const py::object& source, double horizon, std::size_t 
           hand_over_rows(std::move(drawn.signal.values), drawn.signal.dimension), states_of(model.model()));
 }
 
+PyModel with_inputs_of(const PyModel& self, const py::object& times, const py::kwargs& inputs) {
+  if (inputs.empty()) throw InputError("needs the values of an input, NAME=values", "with_inputs");
+  const Doubles t = doubles_of(times, "times");
+  std::vector<InputFunction> functions;
+  for (const auto& [name, values] : inputs) {
+    InputFunction& f = functions.emplace_back();
+    f.name = name.cast<std::string>();
+    const Doubles u = doubles_of(values, f.name);
+    f.times.assign(values_of(t).begin(), values_of(t).end());
+    f.values.assign(values_of(u).begin(), values_of(u).end());
+    if (f.times.empty()) throw InputError("needs at least one time", "times");
+  }
+  return self.with_inputs(std::move(functions));
+}
+
+py::tuple inputs_of(const PyModel& self) {
+  py::dict values;
+  py::object times = py::none();
+  for (const InputFunction& f : self.inputs()) {
+    values[py::str(f.name)] = hand_over(std::vector<double>(f.values));
+    times = hand_over(std::vector<double>(f.times));
+  }
+  return py::make_tuple(times, values);
+}
+
 py::tuple read_observation_file(const py::object& file, const py::object& source, const py::object& set) {
   const PyModel model = PyModel::make(source, assignments_of(set));
   const std::size_t k = model.model().observation_dimension();
-  ObservationPath path = read_observations(py::module_::import("os").attr("fspath")(file).cast<std::string>(),
-                                           k, model.model().observation);
+  ObservationPath path =
+      read_observations(py::module_::import("os").attr("fspath")(file).cast<std::string>(), model.model());
   return py::make_tuple(hand_over(std::move(path.times)), hand_over_rows(std::move(path.values), k));
 }
 
@@ -93,15 +120,23 @@ app::Assignments assignments_of(const py::object& set) {
   return all;
 }
 
+PyModel PyModel::with_inputs(std::vector<InputFunction> inputs) const {
+  PyModel known(text_.with_inputs(inputs, "inputs"), source_, set_);
+  known.inputs_ = std::move(inputs);
+  return known;
+}
+
 PyModel PyModel::make(const py::handle& source, const app::Assignments& set) {
   std::string text;
   const char* origin = text_origin;
   app::Assignments all;
+  std::vector<InputFunction> inputs;
   if (py::isinstance<PyModel>(source)) {
     const auto& model = source.cast<const PyModel&>();
     if (set.empty()) return model;
     text = model.source_;
     all = model.set_;
+    inputs = model.inputs_;
   } else if (py::isinstance<py::dict>(source)) {
     text = py::module_::import("wienertree.model_text").attr("to_toml")(source).cast<std::string>();
     origin = dict_origin;
@@ -113,7 +148,8 @@ PyModel PyModel::make(const py::handle& source, const app::Assignments& set) {
   }
   all.insert(all.end(), set.begin(), set.end());
   TextModel model = parse_or_load(text, origin, all);
-  return {std::move(model), std::move(text), std::move(all)};
+  PyModel result(std::move(model), std::move(text), std::move(all));
+  return inputs.empty() ? result : result.with_inputs(std::move(inputs));
 }
 
 void add_models(py::module_& module) {
@@ -166,13 +202,17 @@ Raises InputError naming file, line, column and key.)")
             return PyModel::make(self, assignments_of(parameters));
           },
           "The same model with other values of parameters: model.replace(kappa=1.5).")
+      .def("with_inputs", &with_inputs_of, "times"_a,
+           R"(The same model with its [inputs] known, functions of time:
+model.with_inputs(times, temperature=values, ..), every one as values at these increasing times.)")
+      .def_property_readonly("inputs", &inputs_of, "Times and values, by name, of the inputs that are known.")
       .def("__repr__", &shown)
       .def("__reduce__", [](const py::object& self) {
         const auto& m = self.cast<const PyModel&>();
         py::dict set;
         for (const auto& [name, value] : m.set()) set[py::str(name)] = value;
         return py::make_tuple(py::module_::import("wienertree.model_text").attr("rebuilt"),
-                              py::make_tuple(m.source(), set));
+                              py::make_tuple(m.source(), set, inputs_of(m)));
       });
 
   module.def(

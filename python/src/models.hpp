@@ -21,6 +21,10 @@ class PyModel {
   const Model& model() const { return text_.model(); }
   const app::Assignments& set() const { return set_; }
   const std::string& source() const { return source_; }
+  /// Those that are known.
+  const std::vector<InputFunction>& inputs() const { return inputs_; }
+  /// The same model with these functions of time. @throws InputError as TextModel::with_inputs
+  PyModel with_inputs(std::vector<InputFunction> inputs) const;
 
  private:
   PyModel(TextModel text, std::string source, app::Assignments set)
@@ -29,6 +33,7 @@ class PyModel {
   TextModel text_;
   std::string source_;
   app::Assignments set_;
+  std::vector<InputFunction> inputs_;
 };
 
 /// {"kappa": 1.5}, or nothing for None. @throws pybind11::cast_error

@@ -40,6 +40,8 @@ def to_toml(model: Mapping) -> str:
     return "\n".join(lines) + "\n"
 
 
-def rebuilt(source: str, set: dict) -> Model:
+def rebuilt(source: str, set: dict, inputs: tuple = (None, {})) -> Model:
     """For pickle."""
-    return Model(source, set=set)
+    model = Model(source, set=set)
+    times, values = inputs
+    return model.with_inputs(times, **values) if values else model

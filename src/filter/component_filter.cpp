@@ -89,10 +89,10 @@ void ComponentFilter::advance(const ObservationWindow& window) {
   const std::span<const double> y = window.observation;
   nonlinear_ = false;
   pilot_evidence_.reset();
-  clock_ = window.start;
+  clock_ = model_.clock(window.start);
   if (window.at_start) weigh(window, y, clock_);
   if (window.length() > 0) cross(window, window.at_start ? std::span<const double>() : y);
-  clock_ = window.end;
+  clock_ = model_.clock(window.end);
   if (!window.at_start) weigh(window, y, clock_);
   check_bounds(window.end);
   time_ = window.end;

@@ -73,7 +73,7 @@ Tilt ComponentFilter::expanded_tilt(std::span<const double> y, double clock, con
 std::vector<Tilt> ComponentFilter::plan(const ObservationWindow& window, std::span<const double> y,
                                         const MixtureMoments& law, std::size_t K, unsigned steps) {
   const LawMoments start{law.mean, law.covariance};
-  const double end = clock_ + window.length();
+  const double end = model_.inputs ? model_.clock(window.end) : clock_ + window.length();
   if (update_->expansion().linear_gaussian())
     return path_.plan(start, clock_, window.length(), K, steps,
                       [&](const LawMoments& reference) { return expanded_tilt(y, end, reference); });

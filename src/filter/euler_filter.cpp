@@ -112,6 +112,7 @@ void EulerFilter::step(const ObservationWindow& window, std::size_t first, std::
   }
   if (!(window.length() > 0)) return;
   move(window, first, x, next, scratch);
+  if (model_.inputs && discrete) set_clock(model_, next, window.end);
   if (discrete && !at_start) add_density(next);
   if (continuous && functional_->uses_end()) {
     scratch.end_sensor.reshape(k, count);

@@ -93,11 +93,11 @@ bool FamilyFilter::observes(const ObservationWindow& window) const {
 
 void FamilyFilter::advance(const ObservationWindow& window) {
   const bool observed = observes(window), first = window.at_start || !(window.length() > 0);
-  clock_ = window.start;  // t is the time of the observations
+  clock_ = model_.clock(window.start);  // t is the time of the observations
   if (observed && first) take_in(window);
   if (window.length() > 0) {
     move(window);
-    clock_ = window.end;
+    clock_ = model_.clock(window.end);
     if (observed && !first) take_in(window);
   }
   ++statistics_.steps;

@@ -149,6 +149,7 @@ void GaussianMixtureFilter::step(const ObservationWindow& window, std::size_t fi
   }
   if (!(window.length() > 0)) return;
   move(window, first, v, next, covariance, scratch);
+  if (model_.inputs && discrete) set_clock(model_, next, window.end);
   if (discrete && !at_start) observe(window, spread_ || alpha_ > 0, next, covariance, log_weight, scratch);
   if (continuous && functional_->uses_end()) {
     scratch.end_sensor.reshape(k, count);

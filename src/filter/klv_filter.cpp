@@ -42,6 +42,9 @@ class KlvFilter::Weigher final : public FamilyVisitor {
 
   void children(std::size_t, std::size_t child, std::size_t count, std::size_t thread) override {
     const std::span<double> w = std::span(weight_).subspan(child, count);
+    // An observation sees the input that begins at its time; the functional of a path what the step ends with.
+    if (model_.inputs && model_.observation == ObservationKind::discrete)
+      set_clock(model_, filter_.children_.states.view().nodes(child, count), window_.end);
     const ConstBatchView x = std::as_const(filter_.children_.states).view().nodes(child, count);
     if (model_.observation == ObservationKind::continuous) weigh_continuous(x, w, filter_.scratch_[thread]);
     if (model_.observation == ObservationKind::discrete) weigh_discrete(x, w, filter_.scratch_[thread]);

@@ -41,12 +41,6 @@ std::string shown(std::string_view text) {
 
 std::string column_name(std::size_t column) { return column == 0 ? "t" : fmt::format("y{}", column); }
 
-std::vector<std::string> column_names(std::size_t dimension) {
-  std::vector<std::string> names;
-  for (std::size_t column = 0; column <= dimension; ++column) names.push_back(column_name(column));
-  return names;
-}
-
 // Whether a number may have been cut off behind this: 0.4, of which "0." is left.
 bool looks_cut_off(std::string_view field) {
   return field.empty() || std::string_view(".eE+-").find(field.back()) != std::string_view::npos;
@@ -60,6 +54,12 @@ void require_rows(std::size_t rows, const std::string& origin, ObservationKind k
 
 }  // namespace
 
+std::vector<std::string> observation_columns(std::size_t dimension) {
+  std::vector<std::string> names;
+  for (std::size_t column = 0; column <= dimension; ++column) names.push_back(column_name(column));
+  return names;
+}
+
 void ObservationPath::append(double time, std::span<const double> value) {
   times.push_back(time);
   values.insert(values.end(), value.begin(), value.end());
@@ -67,10 +67,10 @@ void ObservationPath::append(double time, std::span<const double> value) {
 
 ObservationReader::ObservationReader(std::istream& in, std::string origin, std::size_t dimension,
                                      ObservationKind kind)
-    : ObservationReader(in, std::move(origin), column_names(dimension), kind) {}
+    : ObservationReader(in, std::move(origin), observation_columns(dimension), kind) {}
 
 ObservationReader::ObservationReader(std::istream& in, std::string origin, std::vector<std::string> columns,
-                                     ObservationKind kind)
+                                     ObservationKind kind, const std::function<bool(std::string_view)>& skips)
     : in_(in),
       origin_(std::move(origin)),
       columns_(std::move(columns)),
@@ -78,18 +78,38 @@ ObservationReader::ObservationReader(std::istream& in, std::string origin, std::
       dimension_(columns_.size() - 1),
       kind_(kind),
       last_time_(-std::numeric_limits<double>::infinity()) {
+  read_header(skips);
+}
+
+void ObservationReader::read_header(const std::function<bool(std::string_view)>& skips) {
   const std::string expected = fmt::format("{}", fmt::join(columns_, ","));
   if (!read_line()) throw InputError("empty: expected the header " + expected, origin_);
   std::string_view rest = line_;
   if (rest.starts_with("\xef\xbb\xbf")) rest.remove_prefix(3);  // byte order mark of some spreadsheets
-  bool last = false;
-  for (std::size_t column = 0; !last; ++column) {
+  const auto fail = [&] {
+    const std::string observed =
+        columns_.size() > 1 && columns_[1] != column_name(1)
+            ? ""
+            : fmt::format("the model observes {} component{}: ", dimension_, dimension_ == 1 ? "" : "s");
+    throw InputError(
+        fmt::format("{}expected the header {}{}", observed, expected, skips ? ", in any order" : ""),
+        origin_ + ":1", shown(line_));
+  };
+  std::vector<bool> seen(columns_.size(), false);
+  for (bool last = false; !last;) {
     const std::string_view name = take_field(rest, last);
-    if (column > dimension_ || name != columns_[column] || (last && column != dimension_))
-      throw InputError(fmt::format("the model observes {} component{}: expected the header {}", dimension_,
-                                   dimension_ == 1 ? "" : "s", expected),
-                       origin_ + ":1", shown(line_));
+    const auto column =
+        static_cast<std::size_t>(std::find(columns_.begin(), columns_.end(), name) - columns_.begin());
+    if (column == columns_.size() ? !(skips && skips(name)) : seen[column]) fail();
+    if (!skips && column != fields_.size()) fail();
+    if (column < columns_.size()) seen[column] = true;
+    fields_.push_back(column);
   }
+  if (std::find(seen.begin(), seen.end(), false) != seen.end()) fail();
+}
+
+std::string ObservationReader::name_of_field(std::size_t field) const {
+  return fields_[field] < columns_.size() ? columns_[fields_[field]] : fmt::format("number {}", field + 1);
 }
 
 // The next line, without its end; false at the end of the stream.
@@ -113,36 +133,39 @@ bool ObservationReader::next(double& t, std::span<double> y) {
     if (!read_line()) return false;
   } while (trimmed(line_).empty());
   std::string_view rest = line_;
-  const auto fail = [&](const std::string& message, std::size_t column, std::string_view value) {
-    throw InputError(message, fmt::format("{}:{}: column {}", origin_, line_number_, columns_[column]),
+  const std::size_t last_field = fields_.size() - 1;
+  const auto fail = [&](const std::string& message, std::size_t field, std::string_view value) {
+    throw InputError(message, fmt::format("{}:{}: column {}", origin_, line_number_, name_of_field(field)),
                      shown(value));
   };
   if (const std::size_t comma = rest.rfind(','); !ended_ && looks_cut_off(trimmed(rest.substr(comma + 1)))) {
-    const auto column = static_cast<std::size_t>(std::count(rest.begin(), rest.end(), ','));
+    const auto field = static_cast<std::size_t>(std::count(rest.begin(), rest.end(), ','));
     fail("the row is cut off: it has no end of line, and its last field may go on",
-         std::min(column, dimension_), line_);
+         std::min(field, last_field), line_);
   }
   bool last = false;
-  for (std::size_t column = 0; column <= dimension_; ++column) {
-    if (last) fail("the row ends early", column, line_);
+  for (std::size_t f = 0; f <= last_field; ++f) {
+    if (last) fail("the row ends early", f, line_);
     const std::string_view field = take_field(rest, last);
+    const std::size_t column = fields_[f];
+    if (column == columns_.size()) continue;
     double value = std::numeric_limits<double>::quiet_NaN();
     if (field.empty()) {
-      if (column == 0 || kind_ == ObservationKind::continuous) fail("a value is missing", column, line_);
+      if (column == 0 || kind_ == ObservationKind::continuous) fail("a value is missing", f, line_);
     } else {
       const auto [end, status] = std::from_chars(field.data(), field.data() + field.size(), value);
-      if (status != std::errc() || end != field.data() + field.size()) fail("not a number", column, field);
-      if (!std::isfinite(value)) fail("not a finite number", column, field);
+      if (status != std::errc() || end != field.data() + field.size()) fail("not a number", f, field);
+      if (!std::isfinite(value)) fail("not a finite number", f, field);
     }
     if (column == 0) {
       if (!(value > last_time_))
-        fail("times must increase", column, fmt::format("{} after {}", field, last_time_));
+        fail("times must increase", f, fmt::format("{} after {}", field, last_time_));
       last_time_ = t = value;
     } else {
       y[column - 1] = value;
     }
   }
-  if (!last) fail("the row has too many fields", dimension_, line_);
+  if (!last) fail("the row has too many fields", last_field, line_);
   return true;
 }
 
@@ -191,11 +214,32 @@ ObservationPath read_rows(ObservationReader& reader, const std::string& origin, 
   return path;
 }
 
-ObservationPath read_observations(const std::string& path, std::size_t dimension, ObservationKind kind) {
+std::function<bool(std::string_view)> skips_inputs(const Model& model) {
+  if (!model.inputs) return {};
+  return [inputs = model.inputs](std::string_view name) {
+    return std::ranges::any_of(inputs->functions(), [&](const InputFunction& f) { return f.name == name; });
+  };
+}
+
+namespace {
+
+ObservationPath read_file(const std::string& path, std::size_t k, ObservationKind kind,
+                          const std::function<bool(std::string_view)>& skips) {
   std::ifstream in(path);
   if (!in) throw InputError("cannot be opened", path);
   if (in.peek(); in.bad()) throw InputError("cannot be read", path);
-  return read_observations(in, path, dimension, kind);
+  ObservationReader reader(in, path, observation_columns(k), kind, skips);
+  return read_rows(reader, path, k, kind);
+}
+
+}  // namespace
+
+ObservationPath read_observations(const std::string& path, std::size_t dimension, ObservationKind kind) {
+  return read_file(path, dimension, kind, {});
+}
+
+ObservationPath read_observations(const std::string& path, const Model& model) {
+  return read_file(path, model.observation_dimension(), model.observation, skips_inputs(model));
 }
 
 void write_observations(std::ostream& out, const ObservationPath& path) {

@@ -1,5 +1,6 @@
 #pragma once
 /// Observations as they come in a file: CSV with header `t,y1[,y2..]`, t strictly increasing.
+#include <functional>
 #include <istream>
 #include <memory>
 #include <span>
@@ -44,8 +45,10 @@ class ObservationReader {
   /// @throws InputError if the header is not t,y1..yk with k = `dimension`
   ObservationReader(std::istream& in, std::string origin, std::size_t dimension, ObservationKind kind);
   /// The same of a table whose columns have other names; the first of them is the time.
+  /// @param skips whether a further column of this name is passed over; then columns may stand in any order. Empty: the
+  /// header is the columns
   ObservationReader(std::istream& in, std::string origin, std::vector<std::string> columns,
-                    ObservationKind kind);
+                    ObservationKind kind, const std::function<bool(std::string_view)>& skips = {});
   /// Reads the next row into t and y (k values); false at the end of the stream.
   /// @throws InputError naming origin, line and column for a wrong number of fields, a field that is not a
   /// finite number, a time that does not increase, a missing value where `kind` is continuous, a line longer
@@ -55,12 +58,15 @@ class ObservationReader {
 
  private:
   bool read_line();
+  void read_header(const std::function<bool(std::string_view)>& skips);
+  std::string name_of_field(std::size_t field) const;
   std::istream& in_;
   std::string origin_;
   std::vector<std::string> columns_;
-  std::unique_ptr<char[]> buffer_;  // longest_line + 1; what is not written is not memory
-  std::string_view line_;           // in buffer_
-  bool ended_ = false;              // whether line_ has its end
+  std::vector<std::size_t> fields_;  // the column of each field of a line; columns_.size(): passed over
+  std::unique_ptr<char[]> buffer_;   // longest_line + 1; what is not written is not memory
+  std::string_view line_;            // in buffer_
+  bool ended_ = false;               // whether line_ has its end
   std::size_t dimension_, line_number_ = 0;
   ObservationKind kind_;
   double last_time_;
@@ -82,6 +88,13 @@ ObservationPath read_rows(ObservationReader& reader, const std::string& origin, 
                           ObservationKind kind);
 /// Reads a file. @throws InputError also when it cannot be opened
 ObservationPath read_observations(const std::string& path, std::size_t dimension, ObservationKind kind);
+/// Reads a file. Columns called as an input of the model are passed over. @throws InputError also when it cannot be
+/// opened
+ObservationPath read_observations(const std::string& path, const Model& model);
+/// t, y1 .. yk
+std::vector<std::string> observation_columns(std::size_t dimension);
+/// What is passed over in the observations of a model: columns of its inputs; empty where it has none.
+std::function<bool(std::string_view)> skips_inputs(const Model& model);
 
 /// Writes header and rows with 17 significant digits; NaN as an empty field.
 void write_observations(std::ostream& out, const ObservationPath& path);

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <limits>
 
+#include "wienertree/filter/clock.hpp"
 #include "wienertree/numeric/memory.hpp"
 #include "wienertree/numeric/random.hpp"
 #include "wienertree/tree/initial.hpp"
@@ -25,6 +26,7 @@ class SignalPath {
         next_(model.state_dimension(), 1),
         dB_(p_, 1) {
     draw_initial(model, start, 1, x_);
+    if (model.inputs) set_clock(model, x_, 0);
   }
 
   void step(std::size_t number) {
@@ -38,6 +40,7 @@ class SignalPath {
     model_.fields->euler_step(x_, dt_, dB_, next_);
     for (std::size_t i = 0; i < model_.state_dimension(); ++i) keep_inside(i, number);
     x_.swap(next_);
+    if (model_.inputs) set_clock(model_, x_, dt_ * static_cast<double>(number));
   }
 
   const Batch& state() const { return x_; }
@@ -78,6 +81,7 @@ Simulation simulate(const Model& model, double horizon, std::size_t steps, std::
   if (steps == 0) throw InputError("must be at least 1", "steps", "0");
   if (keep == 0 || steps % keep != 0)
     throw InputError(fmt::format("must divide the number of steps, {}", steps), "keep", std::to_string(keep));
+  if (model.inputs) model.inputs->require_span(0, horizon, "the steps");
   const auto rows = static_cast<double>(keep);
   if (horizon > std::numeric_limits<double>::max() / rows ||
       horizon / static_cast<double>(steps) < std::numeric_limits<double>::min())

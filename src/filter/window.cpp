@@ -25,8 +25,37 @@ std::vector<std::size_t> rows_on_grid(std::span<const double> t, std::size_t n) 
   return rows;
 }
 
+std::vector<std::size_t> rows_with_jumps(std::vector<std::size_t> rows, std::span<const double> times,
+                                         std::span<const double> jumps) {
+  if (jumps.empty()) return rows;
+  for (const double jump : jumps) {
+    const auto r =
+        static_cast<std::size_t>(std::lower_bound(times.begin(), times.end(), jump) - times.begin());
+    if (r > rows.front() && r < rows.back()) rows.push_back(r);
+  }
+  std::sort(rows.begin(), rows.end());
+  rows.erase(std::unique(rows.begin(), rows.end()), rows.end());
+  return rows;
+}
+
+namespace {
+
+// The jumps inside (from, to), apart from both by more than rounding, and `to`.
+std::vector<double> ends_of_pieces(double from, double to, std::span<const double> jumps) {
+  const double rounding =
+      8 * std::numeric_limits<double>::epsilon() * std::max(std::fabs(from), std::fabs(to));
+  std::vector<double> ends;
+  for (auto j = std::upper_bound(jumps.begin(), jumps.end(), from + rounding);
+       j != jumps.end() && *j < to - rounding; ++j)
+    ends.push_back(*j);
+  ends.push_back(to);
+  return ends;
+}
+
+}  // namespace
+
 ObservationWindows::ObservationWindows(ObservationRows path, ObservationKind kind, ObservationTiming timing,
-                                       std::size_t steps)
+                                       std::size_t steps, std::span<const double> jumps)
     : rows_(path), kind_(kind) {
   const std::span<const double> t = path.times;
   const std::size_t gaps = path.rows() - 1;
@@ -37,7 +66,7 @@ ObservationWindows::ObservationWindows(ObservationRows path, ObservationKind kin
     if (steps > gaps)
       throw InputError(fmt::format("more steps than the observation has gaps between rows ({})", gaps),
                        "steps", std::to_string(steps));
-    const auto rows = rows_on_grid(t, steps == 0 ? gaps : steps);
+    const auto rows = rows_with_jumps(rows_on_grid(t, steps == 0 ? gaps : steps), t, jumps);
     for (std::size_t j = 1; j < rows.size(); ++j)
       windows_.push_back({t[rows[j - 1]], t[rows[j]], rows[j - 1], rows[j], false, false});
     return;
@@ -61,22 +90,28 @@ ObservationWindows::ObservationWindows(ObservationRows path, ObservationKind kin
                  fmt::format("a record cut into {} steps", std::max(steps, gaps)), "--steps");
   const double longest = steps == 0 ? INFINITY : (t.back() - t.front()) / static_cast<double>(steps);
   for (std::size_t r = 1; r < path.rows(); ++r) {
-    const double gap = t[r] - t[r - 1];
-    // 1e-9 relative: a gap of exactly `longest` up to rounding is one step.
-    const double wanted = std::max(1.0, std::ceil(gap / longest * (1 - 1e-9)));
     // Between two times there are at most as many others as there are doubles.
     const double spacing = 4 * std::numeric_limits<double>::epsilon() *
                            std::max(std::fabs(t[r - 1]), std::fabs(t[r])),
                  shortest = std::max(spacing, std::numeric_limits<double>::min());
-    if (wanted > 1 && !(gap / wanted >= shortest))
-      throw InputError(fmt::format("the gap between these times is too short for {:g} steps", wanted),
-                       fmt::format("observations: row {}, column t", r + 1), fmt::format("{}", t[r]));
-    const auto parts = static_cast<std::size_t>(wanted);
-    for (std::size_t i = 1; i <= parts; ++i) {
-      const auto at = [&](std::size_t part) {
-        return part == parts ? t[r] : t[r - 1] + gap * static_cast<double>(part) / static_cast<double>(parts);
-      };
-      windows_.push_back({at(i - 1), at(i), r, r, present(r) && (previous ? i == 1 : i == parts), previous});
+    const std::vector<double> ends = ends_of_pieces(t[r - 1], t[r], jumps);
+    double from = t[r - 1];
+    for (const double to : ends) {
+      const double gap = to - from;
+      // 1e-9 relative: a gap of exactly `longest` up to rounding is one step.
+      const double wanted = std::max(1.0, std::ceil(gap / longest * (1 - 1e-9)));
+      if (wanted > 1 && !(gap / wanted >= shortest))
+        throw InputError(fmt::format("the gap between these times is too short for {:g} steps", wanted),
+                         fmt::format("observations: row {}, column t", r + 1), fmt::format("{}", t[r]));
+      const auto parts = static_cast<std::size_t>(wanted);
+      for (std::size_t i = 1; i <= parts; ++i) {
+        const auto at = [&](std::size_t part) {
+          return part == parts ? to : from + gap * static_cast<double>(part) / static_cast<double>(parts);
+        };
+        const bool weighs = previous ? i == 1 && from == t[r - 1] : i == parts && to == t[r];
+        windows_.push_back({at(i - 1), at(i), r, r, present(r) && weighs, previous});
+      }
+      from = to;
     }
   }
 }

@@ -49,9 +49,12 @@ class ObservationWindows {
  public:
   /// @param steps number of steps n; 0 means one for every row. Windows refer to the rows, which must outlive
   /// them.
+  /// @param jumps times at which a coefficient jumps, in order. Steps end there as well; of a continuous record at
+  /// the first row from there on, since Y is known at rows alone.
   /// @throws InputError if steps exceeds the number of gaps between rows (continuous), or is smaller than it
   /// (discrete), or a first row is given where timing "previous" has no earlier state
-  ObservationWindows(ObservationRows rows, ObservationKind kind, ObservationTiming timing, std::size_t steps);
+  ObservationWindows(ObservationRows rows, ObservationKind kind, ObservationTiming timing, std::size_t steps,
+                     std::span<const double> jumps = {});
   /// Of a continuous record, from each of `boundaries` to the next: row numbers that increase, the first 0.
   /// @param linear whether Y is taken to be linear between rows: bridge = 0
   ObservationWindows(ObservationRows rows, std::span<const std::size_t> boundaries, bool linear = false);
@@ -73,6 +76,10 @@ class ObservationWindows {
   bool linear_ = false;
   std::vector<Bounds> windows_;
 };
+
+/// `rows` and, in order with them, the first row from each of `jumps` on, where it lies inside.
+std::vector<std::size_t> rows_with_jumps(std::vector<std::size_t> rows, std::span<const double> times,
+                                         std::span<const double> jumps);
 
 /// Row numbers nearest to a uniform grid of n steps, strictly increasing, from the first row to the last.
 /// @pre 1 <= n < number of times

@@ -25,6 +25,7 @@ void check(const Model& model) {
   require(model.state_names.size() == d, "state_names", model.state_names.size());
   require(model.initial.size() == d, "initial", model.initial.size());
   require(model.bounds.size() == d, "bounds", model.bounds.size());
+  if (model.inputs && !model.inputs->known()) return;
   Batch x(d, 1), out(d, 1);
   for (std::size_t i = 0; i < d; ++i) x(i, 0) = model.initial[i];
   std::vector<double> D(1 + model.noise_dimension(), 0.0);

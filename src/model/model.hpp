@@ -10,6 +10,7 @@
 #include <utility>
 #include <vector>
 
+#include "wienertree/model/input_functions.hpp"
 #include "wienertree/model/vector_fields.hpp"
 #include "wienertree/numeric/error.hpp"
 
@@ -82,6 +83,8 @@ struct Model {
   /// A model that depends on t explicitly carries a last component with V_0 = 1: it is a state to the
   /// mathematics, and reports leave it out.
   bool has_clock = false;
+  /// Known functions of time in the coefficients; then there is a clock, which is theirs. Null: none.
+  std::shared_ptr<const InputFunctions> inputs;
   ObservationKind observation = ObservationKind::none;
   ObservationTiming timing = ObservationTiming::current;
   std::shared_ptr<const ObservationDensity> density;  ///< discrete observations only
@@ -93,6 +96,10 @@ struct Model {
   std::size_t noise_dimension() const { return fields->noise_dimension(); }
   /// k: components of h for continuous observations, of y for discrete ones.
   std::size_t observation_dimension() const;
+  /// The clock at a time of the observations.
+  double clock(double time) const { return inputs ? inputs->clock(time) : time; }
+  /// Where steps end: times at which an input jumps.
+  std::span<const double> jumps() const { return inputs ? inputs->jumps() : std::span<const double>(); }
   /// States a user sees: all but the clock.
   std::size_t reported_dimension() const { return state_dimension() - (has_clock ? 1 : 0); }
 };

@@ -154,8 +154,8 @@ class AdditiveNoise final : public ObservationDensity {
 
 class TapeDensity final : public ObservationDensity {
  public:
-  TapeDensity(Tape log_likelihood, std::string name)
-      : log_likelihood_(std::move(log_likelihood)), name_(std::move(name)) {}
+  TapeDensity(Tape log_likelihood, std::string name, std::shared_ptr<const InputFunctions> inputs)
+      : log_likelihood_(std::move(log_likelihood)), name_(std::move(name)), inputs_(std::move(inputs)) {}
 
   std::size_t observation_dimension() const override { return log_likelihood_.uniforms(); }
 
@@ -172,6 +172,7 @@ class TapeDensity final : public ObservationDensity {
     thread_local std::vector<const double*> inputs;
     inputs.clear();
     for (std::size_t i = 0; i < x.components(); ++i) inputs.push_back(x.component(i).data());
+    if (inputs_) inputs_->append(x.component(x.components() - 1), inputs);
     double* const output = out.data();
     log_likelihood_.evaluate(inputs, y, std::span(&output, 1), x.nodes());
   }
@@ -189,6 +190,7 @@ class TapeDensity final : public ObservationDensity {
  private:
   Tape log_likelihood_;
   std::string name_;
+  std::shared_ptr<const InputFunctions> inputs_;
 };
 
 }  // namespace
@@ -220,8 +222,9 @@ std::unique_ptr<ObservationDensity> make_additive_noise(std::shared_ptr<const Ve
   return std::make_unique<AdditiveNoise>(std::move(fields), std::move(laws));
 }
 
-std::unique_ptr<ObservationDensity> make_tape_density(Tape log_likelihood, std::string name) {
-  return std::make_unique<TapeDensity>(std::move(log_likelihood), std::move(name));
+std::unique_ptr<ObservationDensity> make_tape_density(Tape log_likelihood, std::string name,
+                                                      std::shared_ptr<const InputFunctions> inputs) {
+  return std::make_unique<TapeDensity>(std::move(log_likelihood), std::move(name), std::move(inputs));
 }
 
 }  // namespace wienertree

@@ -30,9 +30,10 @@ double log_noise(const NoiseLaw& law, double v);
 std::unique_ptr<ObservationDensity> make_additive_noise(std::shared_ptr<const VectorFields> fields,
                                                         std::vector<NoiseLaw> laws);
 
-/// Log density by a tape: inputs the d states, uniforms y_1 .. y_k, one output. It cannot be sampled from,
-/// nor split when only some components are missing. name: how errors call it, e.g.
-/// "model.toml, observation.log_likelihood"
-std::unique_ptr<ObservationDensity> make_tape_density(Tape log_likelihood, std::string name);
+/// Log density by a tape: inputs the d states and, for functions of time that are not null, their columns at the last
+/// state, which is the clock; uniforms y_1 .. y_k, one output. It cannot be sampled from, nor split when only some
+/// components are missing. name: how errors call it, e.g. "model.toml, observation.log_likelihood"
+std::unique_ptr<ObservationDensity> make_tape_density(Tape log_likelihood, std::string name,
+                                                      std::shared_ptr<const InputFunctions> inputs = nullptr);
 
 }  // namespace wienertree

@@ -9,6 +9,7 @@
 #include <fstream>
 
 #include "wienertree/model/text/assembly.hpp"
+#include "wienertree/model/text/bounded_states.hpp"
 #include "wienertree/model/text/branches.hpp"
 #include "wienertree/model/text/exact_filter.hpp"
 #include "wienertree/model/text/smoothing.hpp"
@@ -20,6 +21,7 @@ namespace wienertree {
 struct TextModel::Contents {
   text::ModelSource source;
   std::vector<double> parameters;
+  std::shared_ptr<const InputFunctions> inputs = nullptr;  ///< null: as yet without values, or none
   Model model;
   std::string exact_filter_reason;
   text::SquareRootAnswer square_roots;
@@ -43,6 +45,15 @@ std::vector<std::string> printed(const std::vector<text::Expression>& list) {
   std::vector<std::string> result;
   for (text::Expression e : list) result.push_back(print(e));
   return result;
+}
+
+// As yet without values.
+std::shared_ptr<const InputFunctions> unknown_inputs(const text::ModelSource& source) {
+  if (source.inputs.empty()) return nullptr;
+  std::vector<InputFunction> functions;
+  for (const text::InputSource& input : source.inputs)
+    functions.push_back({input.name, input.between, {}, {}});
+  return std::make_shared<InputFunctions>(std::move(functions), "model " + source.name);
 }
 
 std::vector<std::vector<std::string>> printed(const std::vector<std::vector<text::Expression>>& lists) {
@@ -72,7 +83,8 @@ std::shared_ptr<TextModel::Contents> TextModel::build(Contents contents) {
   text::Arena arena;
   const text::FieldExpressions bound =
       text::substitute(symbolic.coefficients, source, contents.parameters, arena);
-  contents.model = text::assemble(source, bound, contents.parameters);
+  if (!contents.inputs) contents.inputs = unknown_inputs(source);
+  contents.model = text::assemble(source, bound, contents.parameters, contents.inputs);
   const text::ExactFilterAnswer exact = text::exact_filter({bound, source, contents.model});
   contents.model.exact_filter = exact.filter;
   contents.model.benes = exact.benes;
@@ -82,10 +94,33 @@ std::shared_ptr<TextModel::Contents> TextModel::build(Contents contents) {
   return std::make_shared<Contents>(std::move(contents));
 }
 
+TextModel TextModel::with_inputs(std::vector<InputFunction> functions, const std::string& origin) const {
+  Contents known;
+  known.source = contents_->source;
+  known.parameters = contents_->parameters;
+  std::vector<std::string> names;
+  std::vector<InputFunction> in_order;
+  for (const text::InputSource& input : known.source.inputs) {
+    names.push_back(input.name);
+    const auto given = std::find_if(functions.begin(), functions.end(),
+                                    [&](const InputFunction& f) { return f.name == input.name; });
+    if (given == functions.end()) throw InputError("lacks an input of the model", origin, input.name);
+    in_order.push_back(std::move(*given));
+    in_order.back().between = input.between;
+    functions.erase(given);
+  }
+  if (!functions.empty())
+    throw InputError("the model has no such input" + text::suggestion(functions.front().name, names), origin,
+                     functions.front().name);
+  if (!in_order.empty()) known.inputs = std::make_shared<InputFunctions>(std::move(in_order), origin);
+  return TextModel(build(std::move(known)));
+}
+
 TextModel TextModel::with_integrals(const std::vector<RunningIntegral>& integrals) const {
   Contents extended;
   extended.source = contents_->source;
   extended.parameters = contents_->parameters;
+  extended.inputs = contents_->inputs;
   extended.source.observation = {};
   extended.source.exact.reset();
   for (const RunningIntegral& integral : integrals)
@@ -103,6 +138,7 @@ TextModel TextModel::without_price() const {
   Contents reduced;
   reduced.source = contents_->source;
   reduced.parameters = contents_->parameters;
+  reduced.inputs = contents_->inputs;
   reduced.source.observation = {};
   reduced.source.exact.reset();
   for (const SquareRootStructure::Component& component : structure.components) {
@@ -129,7 +165,7 @@ Model TextModel::with_brackets(const std::vector<std::pair<std::size_t, std::siz
   text::Arena arena;
   const text::FieldExpressions bound =
       text::substitute(symbolic.coefficients, source, contents_->parameters, arena);
-  Model model = text::assemble(source, bound, contents_->parameters);
+  Model model = text::assemble(source, bound, contents_->parameters, contents_->inputs);
   check(model);
   return model;
 }
@@ -144,6 +180,8 @@ ModelAnalysis TextModel::analysis() const {
   result.name = model.name;
   result.convention = contents_->source.convention == text::Convention::ito ? "ito" : "stratonovich";
   result.states = model.state_names;
+  for (const text::InputSource& input : contents_->source.inputs)
+    result.inputs.emplace_back(input.name, input.between);
   result.has_clock = model.has_clock;
   result.parameters = model.parameters;
   result.correlation = printed(c.correlation);
@@ -170,19 +208,22 @@ ModelAnalysis TextModel::analysis() const {
 namespace {
 
 // Observations are `uniforms`, or with `further` components of x after the d states, those.
-BatchFunction batch_function(text::Expression e, std::size_t d, std::vector<double> uniforms,
+BatchFunction batch_function(text::Expression e, const Model& model, std::vector<double> uniforms,
                              std::size_t further = 0) {
-  TapeBuilder builder(d + further, uniforms.size());
+  const std::size_t d = model.state_dimension(), columns = model.inputs ? model.inputs->columns() : 0;
+  TapeBuilder builder(d + further + columns, uniforms.size());
   text::TapeSymbols symbols;
   for (std::size_t i = 0; i < d; ++i) symbols.states.push_back(builder.input(i));
   for (std::size_t i = 0; i < uniforms.size(); ++i) symbols.observations.push_back(builder.uniform(i));
   for (std::size_t i = 0; i < further; ++i) symbols.observations.push_back(builder.input(d + i));
+  if (model.inputs) text::take_columns(symbols, builder, *model.inputs, d + further);
   const TapeBuilder::Value output = text::emit(e, symbols, builder);
-  return [tape = builder.finish(std::span(&output, 1)), uniforms = std::move(uniforms)](
-             ConstBatchView x, std::span<double> out) {
+  return [tape = builder.finish(std::span(&output, 1)), uniforms = std::move(uniforms), known = model.inputs,
+          clock = d - 1](ConstBatchView x, std::span<double> out) {
     thread_local std::vector<const double*> inputs;
     inputs.clear();
     for (std::size_t i = 0; i < x.components(); ++i) inputs.push_back(x.component(i).data());
+    if (known) known->append(x.component(clock), inputs);
     double* const outputs = out.data();
     tape.evaluate(inputs, uniforms, std::span(&outputs, 1), x.nodes());
   };
@@ -199,21 +240,21 @@ text::Expression TextModel::bound_expression(std::string_view expression, const 
 
 BatchFunction TextModel::compile(std::string_view expression, const std::string& where) const {
   text::Arena arena;
-  return batch_function(bound_expression(expression, where, arena), contents_->model.state_dimension(), {});
+  return batch_function(bound_expression(expression, where, arena), contents_->model, {});
 }
 
 KinkedFunction TextModel::compile_kinked(std::string_view expression, const std::string& where) const {
   const auto arena = std::make_shared<text::Arena>();
   const text::Expression e = bound_expression(expression, where, *arena);
-  const std::size_t d = contents_->model.state_dimension();
+  const std::shared_ptr<const Contents> contents = contents_;
   const text::SmoothedKinks smoothed = text::smooth_kinks(e, *arena);
   const text::Branches branches = text::branches_of(e, *arena);
   KinkedFunction function;
-  function.exact = batch_function(e, d, {});
+  function.exact = batch_function(e, contents->model, {});
   for (const text::Expression argument : branches.exact)
-    function.kinks.push_back(batch_function(argument, d, {}));
-  const auto bound_to = [arena, d](text::Expression value, std::span<const double> numbers) {
-    return batch_function(value, d, std::vector<double>(numbers.begin(), numbers.end()));
+    function.kinks.push_back(batch_function(argument, contents->model, {}));
+  const auto bound_to = [arena, contents](text::Expression value, std::span<const double> numbers) {
+    return batch_function(value, contents->model, std::vector<double>(numbers.begin(), numbers.end()));
   };
   function.smoothed = [bound_to, value = smoothed.value](std::span<const double> widths) {
     std::vector<double> inverse;
@@ -228,8 +269,8 @@ KinkedFunction TextModel::compile_kinked(std::string_view expression, const std:
     return bound_to(arguments[k], above);
   };
   if (branches.exact == branches.arguments)
-    function.with_argument = [arena, e, exact = branches.exact, d](std::size_t k) {
-      return batch_function(text::with_argument(e, exact[k], *arena), d, {}, 1);
+    function.with_argument = [arena, e, exact = branches.exact, contents](std::size_t k) {
+      return batch_function(text::with_argument(e, exact[k], *arena), contents->model, {}, 1);
     };
   return function;
 }

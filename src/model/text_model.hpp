@@ -37,6 +37,8 @@ struct ModelAnalysis {
   std::string name;
   std::string convention;           ///< in which the drift was given: "ito", "stratonovich"
   std::vector<std::string> states;  ///< d names, the last one "t" when `has_clock`
+  /// Known functions of time, in which u' stands for the slope of u.
+  std::vector<std::pair<std::string, Between>> inputs;
   bool has_clock = false;
   std::vector<std::pair<std::string, double>> parameters;  ///< after overrides
   /// Of the Brownian motions of the file, p x p; V_1 .. V_p are along independent ones. Empty: they are these.
@@ -86,6 +88,11 @@ class TextModel {
   KinkedFunction compile_kinked(std::string_view expression, const std::string& where) const;
   /// The value of an expression in which no state occurs, nor t; nothing if one does. Otherwise as `compile`.
   std::optional<double> constant(std::string_view expression, const std::string& where) const;
+
+  /// The same model with its inputs known. functions: one for each name of [inputs], in any order; how they are between
+  /// their times is as in the file. origin: how errors call them.
+  /// @throws InputError for a name that is missing or unknown, or as InputFunctions
+  TextModel with_inputs(std::vector<InputFunction> functions, const std::string& origin) const;
 
   /// The signal of this model with the integrals as further states after its own: d name = integrand dt,
   /// starting from 0. An integrand may use the integrals before it. What is observed is left out.

@@ -116,8 +116,9 @@ ControlledFilter::Plan ControlledFilter::plan(RunRole role, int level) const {
   const bool coarser = model_.observation == ObservationKind::continuous && output_rows_.size() > 2;
   if (role == RunRole::steps) halvings += coarser ? -1 : 1;
   if (model_.observation == ObservationKind::continuous) {
-    const std::vector<std::size_t> boundaries =
-        halvings < 0 ? every_other(output_rows_) : refined(rows_.times, output_rows_, halvings);
+    const std::vector<std::size_t> boundaries = rows_with_jumps(
+        halvings < 0 ? every_other(output_rows_) : refined(rows_.times, output_rows_, halvings), rows_.times,
+        model_.jumps());
     bool linear = role == RunRole::rows;
     if (linear && !closed_form() && o.functional != FunctionalMethod::second_order) {
       o.functional = FunctionalMethod::second_order;  // knows more of the rows
@@ -130,7 +131,8 @@ ControlledFilter::Plan ControlledFilter::plan(RunRole role, int level) const {
     steps = rows_.rows() - 1;  // the filter chooses its own inside
   else if (halvings > 0)
     steps <<= halvings;
-  return {role, level, std::move(setup), ObservationWindows(rows_, model_.observation, model_.timing, steps)};
+  return {role, level, std::move(setup),
+          ObservationWindows(rows_, model_.observation, model_.timing, steps, model_.jumps())};
 }
 
 // An unpruned tree has no room for a formula of more paths.

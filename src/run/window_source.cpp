@@ -20,7 +20,9 @@ class RecordedWindows final : public WindowSource {
       : owned_(std::move(owned)),
         rows_(rows),
         windows_(rows_, model.observation, model.timing,
-                 steps.value_or(default_steps(rows_, model.observation))) {}
+                 steps.value_or(default_steps(rows_, model.observation)), model.jumps()) {
+    if (model.inputs) model.inputs->require_span(windows_.start(), windows_.end(), "the observations");
+  }
 
   bool next(ObservationWindow& window) override {
     if (done_ == windows_.size()) return false;
@@ -63,7 +65,9 @@ class StreamedWindows final : public WindowSource {
         timing_(model.timing),
         origin_(origin),
         interrupted_(std::move(interrupted)),
-        reader_(in, origin, model.observation_dimension(), model.observation),
+        inputs_(model.inputs),
+        reader_(in, origin, observation_columns(model.observation_dimension()), model.observation,
+                skips_inputs(model)),
         value_(model.observation_dimension()) {
     if (resumed) return;
     if (!read_row()) throw InputError("no rows after the header", origin_);
@@ -119,6 +123,7 @@ class StreamedWindows final : public WindowSource {
       return false;
     }
     time_ = time;
+    if (inputs_) inputs_->require_span(time, time, "the observations");
     ++rows_;
     return true;
   }
@@ -132,6 +137,7 @@ class StreamedWindows final : public WindowSource {
   ObservationTiming timing_;
   std::string origin_;
   std::function<bool()> interrupted_;
+  std::shared_ptr<const InputFunctions> inputs_;
   ObservationReader reader_;
   std::vector<double> value_;
   ObservationPath pair_;
@@ -152,8 +158,7 @@ std::size_t default_steps(const ObservationRows& rows, ObservationKind kind) {
 
 std::unique_ptr<WindowSource> open_windows(const std::string& file, const Model& model,
                                            std::optional<std::size_t> steps) {
-  auto path = std::make_unique<const ObservationPath>(
-      read_observations(file, model.observation_dimension(), model.observation));
+  auto path = std::make_unique<const ObservationPath>(read_observations(file, model));
   const ObservationRows rows = *path;
   return std::make_unique<RecordedWindows>(rows, model, steps, std::move(path));
 }
@@ -165,6 +170,10 @@ std::unique_ptr<WindowSource> cut_windows(ObservationRows rows, const Model& mod
 
 std::unique_ptr<WindowSource> follow_windows(std::istream& in, const std::string& origin, const Model& model,
                                              bool resumed, std::function<bool()> interrupted) {
+  if (!model.jumps().empty())
+    throw InputError(
+        "a stream is filtered row by row, and inputs jump between its rows: give the observations as a file",
+        origin, fmt::format("t = {}", model.jumps().front()));
   return std::make_unique<StreamedWindows>(in, origin, model, resumed, std::move(interrupted));
 }
 

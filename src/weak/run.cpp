@@ -46,12 +46,23 @@ double extrapolate(double coarse, double fine, std::size_t k, std::size_t n, int
 
 namespace {
 
+// The ends of the intervals that are cut into steps: horizons and jumps.
+std::vector<double> ends_of_intervals(const WeakRun& run) {
+  std::vector<double> ends = run.horizons.empty() ? std::vector{run.horizon} : run.horizons;
+  const std::size_t horizons = ends.size();
+  ends.insert(ends.end(), run.jumps.begin(), run.jumps.end());
+  std::inplace_merge(ends.begin(), ends.begin() + static_cast<std::ptrdiff_t>(horizons), ends.end());
+  ends.erase(std::unique(ends.begin(), ends.end()), ends.end());
+  return ends;
+}
+
 // f_k of each interval.
-std::vector<double> shares(const std::vector<double>& horizons) {
+std::vector<double> shares(const WeakRun& run, const std::vector<double>& ends) {
   std::vector<double> result;
   double before = 0;
-  for (const double t : horizons)
-    result.push_back(std::exp2(std::round(std::log2((t - std::exchange(before, t)) / t))));
+  for (const double t : ends)
+    result.push_back(std::exp2(
+        std::round(std::log2((t - std::exchange(before, t)) / (run.jumps.empty() ? t : ends.back())))));
   return result;
 }
 
@@ -59,19 +70,28 @@ std::size_t steps_of_share(std::size_t m, double share) {
   return std::max<std::size_t>(1, static_cast<std::size_t>(static_cast<double>(m) * share));
 }
 
+bool is_one_interval(const WeakRun& run) { return run.horizons.size() < 2 && run.jumps.empty(); }
+
 }  // namespace
 
+std::vector<double> jumps_inside(const Model& model, double horizon) {
+  std::vector<double> inside;
+  for (const double jump : model.jumps())
+    if (jump > 0 && jump < horizon) inside.push_back(jump);
+  return inside;
+}
+
 std::size_t steps_of_level(const WeakRun& run, std::size_t m) {
-  if (run.horizons.size() < 2) return m;
+  if (is_one_interval(run)) return m;
   std::size_t sum = 0;
-  for (const double share : shares(run.horizons)) sum += steps_of_share(m, share);
+  for (const double share : shares(run, ends_of_intervals(run))) sum += steps_of_share(m, share);
   return sum;
 }
 
 std::size_t level_of(const WeakRun& run) {
-  if (run.horizons.size() < 2) return run.steps;
+  if (is_one_interval(run)) return run.steps;
   double sum = 0;
-  for (const double share : shares(run.horizons)) sum += share;
+  for (const double share : shares(run, ends_of_intervals(run))) sum += share;
   const double m = static_cast<double>(run.steps) / sum;
   // Extrapolation wants every interval to have twice the steps of the coarser tree: down to f_k = 1/4.
   const double multiple = run.richardson ? 8 : 1;
@@ -80,7 +100,7 @@ std::size_t level_of(const WeakRun& run) {
 
 void set_grid(const WeakRun& run, std::size_t m, WeakOptions& options) {
   options.report_at.clear();
-  if (run.horizons.size() < 2) {
+  if (is_one_interval(run)) {
     options.grid = time_grid(run.grid, run.horizon, m, run.gamma);
     return;
   }
@@ -88,16 +108,19 @@ void set_grid(const WeakRun& run, std::size_t m, WeakOptions& options) {
     if (!(run.horizons[i] > (i == 0 ? 0 : run.horizons[i - 1])) || !std::isfinite(run.horizons[i]))
       throw InputError("times must be positive and ascend", "horizon", std::to_string(run.horizons[i]));
   if (run.grid != GridKind::uniform)
-    throw InputError("has one time to shrink towards, not several", "grid", "kusuoka");
+    throw InputError(run.jumps.empty() ? "has one time to shrink towards, not several"
+                                       : "has no room for the jumps of inputs",
+                     "grid", "kusuoka");
   options.grid.assign(1, 0.0);
-  const std::vector<double> share = shares(run.horizons);
+  const std::vector<double> ends = ends_of_intervals(run), share = shares(run, ends);
   for (std::size_t k = 0; k < share.size(); ++k) {
-    const double from = k == 0 ? 0 : run.horizons[k - 1], length = run.horizons[k] - from;
+    const double from = k == 0 ? 0 : ends[k - 1], length = ends[k] - from;
     const std::size_t n = steps_of_share(m, share[k]);
     for (std::size_t i = 1; i < n; ++i)
       options.grid.push_back(from + length * static_cast<double>(i) / static_cast<double>(n));
-    options.grid.push_back(run.horizons[k]);
-    options.report_at.push_back(options.grid.size() - 1);
+    options.grid.push_back(ends[k]);
+    if (run.horizons.size() > 1 && std::binary_search(run.horizons.begin(), run.horizons.end(), ends[k]))
+      options.report_at.push_back(options.grid.size() - 1);
   }
 }
 

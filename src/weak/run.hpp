@@ -19,6 +19,8 @@ struct WeakRun {
   std::uint32_t launches = 1, first_launch = 0;  ///< launches from first_launch on
   /// Also from ceil(n/2) steps, and the two extrapolated.
   bool richardson = false;
+  /// Times inside (0, T) at which steps are to end as well, ascending: inputs jump there.
+  std::vector<double> jumps = {};
 };
 
 /// Per payoff, time by time where there are several. Standard errors are those of the average of the
@@ -39,8 +41,12 @@ WeakResult run_weak(const Model& model, const std::vector<WeakPayoff>& payoffs, 
 
 /// Level m of the grid: with one time m steps. With several, m steps to the first, and m f_k, at least 1, in the
 /// k-th interval, f_k the power of 2 next to (T_k - T_{k-1}) / T_k: what a step must be short against is the
-/// time at which it is looked at. All steps together.
+/// time at which it is looked at. With jumps m f_k, at least 1, in each interval between times, of a horizon or of a jump,
+/// f_k the power of 2 next to (T_k - T_{k-1}) / T. All steps together.
 std::size_t steps_of_level(const WeakRun& run, std::size_t m);
+
+/// The times in (0, horizon) at which an input of the model jumps.
+std::vector<double> jumps_inside(const Model& model, double horizon);
 
 /// The level with about run.steps steps, >= 1.
 std::size_t level_of(const WeakRun& run);

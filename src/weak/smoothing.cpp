@@ -63,6 +63,7 @@ std::vector<std::vector<KinkScale>> kink_scales(const Model& model,
   pilot.options.tolerance = {1e-5, 1e-7};
   pilot.horizon = horizon;
   pilot.steps = 8;
+  pilot.jumps = jumps_inside(model, horizon);
   const std::vector<double> moments = run_weak(model, arguments, pilot).value;
   const double mass = moments[0];  // below 1 where payoffs are discounted
   std::size_t at = 1;

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <utility>
 
 #include "wienertree/thinning/recombination/recombination.hpp"
@@ -47,7 +48,9 @@ class WeakTree {
 
   void plant(const Generation& start) {
     copy_generation(start, nodes_);
-    if (model_.has_clock) clock_ = nodes_.states(model_.state_dimension() - 1, 0) - options_.grid.front();
+    if (model_.inputs) std::ranges::fill(nodes_.states.component(model_.state_dimension() - 1), clock_at(0));
+    if (model_.has_clock && !model_.inputs)
+      clock_ = nodes_.states(model_.state_dimension() - 1, 0) - options_.grid.front();
   }
 
   void grow() {
@@ -128,11 +131,16 @@ class WeakTree {
     }
   }
 
+  // At the end of step j: of inputs that jump there the values after the jump.
+  double clock_at(std::size_t j) const {
+    return model_.inputs ? model_.clock(options_.grid[j]) : clock_ + options_.grid[j];
+  }
+
   // What is the same for all nodes at a time must not come to differ by rounding.
   void settle(Generation& nodes, std::size_t j) const {
     if (model_.has_clock) {
       const auto clock = nodes.states.component(model_.state_dimension() - 1);
-      std::fill(clock.begin(), clock.end(), clock_ + options_.grid[j]);
+      std::fill(clock.begin(), clock.end(), clock_at(j));
     }
     if (!options_.discount_state) return;
     const auto x = nodes.states.component(*options_.discount_state);
@@ -260,7 +268,7 @@ class WeakTree {
   bool two_steps_ = false;  ///< families are those of the last two steps
   bool on_a_line_ = false;  ///< patches have a given width, whatever the budget
   bool by_width_ = false;   ///< thinning looks at local standard deviations
-  double clock_ = 0;        ///< at t = 0
+  double clock_ = 0;        ///< at t = 0, without inputs
   WeakEstimate estimate_;
   std::unique_ptr<Thinning> thinning_;
   TreeGrower grower_;
@@ -282,6 +290,22 @@ class WeakTree {
 
 }  // namespace
 
+namespace {
+
+// Inputs are known on the grid, and jump at points of it alone.
+void check_inputs(const InputFunctions& inputs, const std::vector<double>& grid) {
+  inputs.require_span(grid.front(), grid.back(), "the steps");
+  for (const double jump : inputs.jumps()) {
+    if (!(jump > grid.front() && jump < grid.back())) continue;
+    const auto after = std::ranges::lower_bound(grid, jump);
+    const double apart = std::min(*after - jump, jump - *(after - 1));
+    if (apart > 8 * std::numeric_limits<double>::epsilon() * std::abs(jump))
+      throw InputError("a step must end where an input jumps", "grid", fmt::format("t = {}", jump));
+  }
+}
+
+}  // namespace
+
 WeakEstimate weak_approximation(const Model& model, const Generation& start,
                                 const std::vector<WeakPayoff>& payoffs, const WeakOptions& options) {
   check(model);
@@ -292,6 +316,7 @@ WeakEstimate weak_approximation(const Model& model, const Generation& start,
     throw InputError(fmt::format("is not one of {} states", model.state_dimension()), "discount_state",
                      std::to_string(*options.discount_state));
   if (options.nodes == 0) throw InputError("must be at least 1", "nodes", "0");
+  if (model.inputs) check_inputs(*model.inputs, options.grid);
   for (const WeakPayoff& payoff : payoffs)
     if (!payoff.at_times.empty() &&
         payoff.at_times.size() != std::max<std::size_t>(1, options.report_at.size()))

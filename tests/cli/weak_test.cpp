@@ -233,6 +233,105 @@ TEST_CASE("weak: Heston's model with a correlation has the price of the factor w
                         Catch::Contains("exact transition: s is lognormal given these"));
 }
 
+TEST_CASE("weak: inputs, against closed forms") {
+  const Workplace place;
+  const auto model = [&](const std::string& between, const std::string& drift, const std::string& diffusion) {
+    place.write("m.toml", "name = \"m\"\nconvention = \"ito\"\n[inputs]\nu = { between = \"" + between +
+                              "\" }\n[state]\ns = { initial = 1.0 }\n[drift]\ns = \"" + drift +
+                              "\"\n[diffusion]\ns = [\"" + diffusion + "\"]\n");
+  };
+  place.write("u.csv", "t,u,other\n0,0.1,x\n0.25,0.5,\n0.6,0.2,y\n1,0.3,z\n");
+  const std::vector<double> t{0, 0.25, 0.6, 1}, u{0.1, 0.5, 0.2, 0.3};
+  for (const bool linear : {false, true}) {
+    const std::string between = linear ? "linear" : "previous";
+    INFO(between);
+    // s_b = e s_a + (1 - e) u(a) + u' (D - (1 - e)), e = exp(-D), and the integral of u^2.
+    double mean = 1, variance = 0;
+    for (std::size_t i = 0; i + 1 < t.size(); ++i) {
+      const double D = t[i + 1] - t[i], e = std::exp(-D), end = linear ? u[i + 1] : u[i];
+      mean = e * mean + (1 - e) * u[i] + (end - u[i]) / D * (D - (1 - e));
+      variance += D * (u[i] * u[i] + u[i] * end + end * end) / 3;
+    }
+    model(between, "u - s", "0.3");
+    CHECK(value_of(place, "m.toml --payoff s --horizon 1 --steps 8 --inputs u.csv") ==
+          Approx(mean).margin(1e-8));
+    CHECK(value_of(place, "m.toml --payoff s+u --horizon 1 --steps 8 --inputs u.csv") ==
+          Approx(mean + 0.3).margin(1e-8));
+    // Black and Scholes' call with the variance that is integrated.
+    const auto normal = [](double z) { return 0.5 * std::erfc(-z / std::sqrt(2.0)); };
+    const double root = std::sqrt(variance), d1 = (std::log(1 / 1.05) + 0.02) / root + root / 2;
+    const double call = std::exp(0.02) * normal(d1) - 1.05 * normal(d1 - root);
+    model(between, "0.02*s", "u*s");
+    const auto row =
+        rows_of(place, "m.toml --payoff max(s-1.05,0) --horizon 1 --tolerance 1e-5 --inputs u.csv")[0];
+    const double error = std::abs(row["value"].get<double>() - call);
+    CHECK(error < 1e-6);
+    CHECK(error <= row["error"].get<double>());
+    // Jumps beside other times to report at.
+    const auto rows =
+        rows_of(place, "m.toml --payoff s --horizon 0.5,0.6,0.9 --tolerance 1e-5 --inputs u.csv");
+    for (std::size_t k = 0; k < 3; ++k)
+      CHECK(rows[k]["value"].get<double>() ==
+            Approx(std::exp(0.02 * rows[k]["horizon"].get<double>())).margin(1e-5));
+  }
+  CHECK_THAT(place.run("model show m.toml").out, Catch::Contains("u: linear between its times"));
+}
+
+TEST_CASE("inputs that are missing or wrong are told by place and value, with exit code 2") {
+  const Workplace place;
+  const std::string text =
+      "name = \"m\"\nconvention = \"ito\"\n[inputs]\nu = { between = \"previous\" }\n[state]\nx = { initial "
+      "= 1.0 }\n"
+      "[drift]\nx = \"u - x\"\n[diffusion]\nx = [\"0.3\"]\n[observation]\nkind = \"discrete\"\nh = [\"x\"]\n"
+      "noise = { law = \"gaussian\", sd = 0.5 }\n";
+  place.write("m.toml", text);
+  place.write("u.csv", "t,u\n0,1\n0.5,2\n1,3\n");
+  place.write("y.csv", "t,y1\n0,1\n0.6,1.2\n1,1.4\n");
+  place.write("both.csv", "u,t,y1\n1,0,1\n2,0.6,1.2\n3,1,1.4\n");
+  place.write("long.csv", "t,y1\n0,1\n2,1.2\n");
+  place.write("nan.csv", "t,u\n0,1\n0.5,nan\n1,3\n");
+  place.write("unsorted.csv", "t,u\n0,1\n0.5,2\n0.4,3\n");
+  place.write("gap.csv", "t,u\n0,1\n0.5,\n1,3\n");
+  place.write(
+      "study.toml",
+      "title = \"s\"\nquantity = \"mean_x\"\nmeasure = [\"absolute\"]\nreference = \"none\"\n[observations]\n"
+      "horizon = 1.0\nsteps = 10\nkeep = 10\n[options]\nmodel = \"./m.toml\"\nnodes = [10]\n");
+  const std::vector<std::pair<std::string, std::string>> refused{
+      {"filter m.toml --observations y.csv", "y.csv: the model depends on inputs: give a CSV file t,u"},
+      {"filter m.toml --observations - --inputs u.csv", "standard input: a stream is filtered row by row"},
+      {"filter m.toml --observations long.csv --inputs u.csv",
+       "u.csv: column u: the input u is given from t = 0 to t = 1"},
+      {"filter m.toml --observations y.csv --inputs nan.csv",
+       "nan.csv:3: column u: not a finite number (nan)"},
+      {"filter m.toml --observations y.csv --inputs unsorted.csv",
+       "unsorted.csv:4: column t: times must increase"},
+      {"filter m.toml --observations y.csv --inputs gap.csv", "gap.csv:3: column u: a value is missing"},
+      {"filter m.toml --observations y.csv --inputs y.csv", "y.csv:1: expected the header t,u"},
+      {"filter nile --observations y.csv --inputs u.csv", "--inputs: the model has no [inputs] (u.csv)"},
+      {"compare nile nile:sd_level=30 --observations y.csv --inputs u.csv", ""},
+      {"weak m.toml --payoff x --horizon 1 --steps 2", "--inputs: the model depends on inputs"},
+      {"weak m.toml --payoff x --horizon 2 --steps 2 --inputs u.csv", "and the steps end at t = 2"},
+      {"weak m.toml --payoff x --horizon 1 --steps 2 --inputs u.csv --grid kusuoka", "no room for the jumps"},
+      {"simulate m.toml --horizon 1 --steps 10 --observations out.csv",
+       "--inputs: the model depends on inputs"},
+      {"tree m.toml --horizon 1 --steps 3 --dot -", "model m: depends on the input u"},
+      {"study study.toml --output out", "depends on the input u, and a study has no file for inputs"}};
+  for (const auto& [command, message] : refused) {
+    INFO(command);
+    const Outcome outcome = place.run(command);
+    INFO(outcome.err);
+    CHECK(outcome.code == 2);
+    CHECK_THAT(outcome.err, Catch::Contains(message));
+  }
+  // As columns of the observations, in any order, and from a file of their own.
+  place.write("same.csv", "t,u\n0,1\n0.6,2\n1,3\n");
+  const std::string columns = place.run("filter m.toml --observations both.csv --quiet").out;
+  CHECK(columns == place.run("filter m.toml --observations y.csv --inputs same.csv --quiet").out);
+  CHECK(columns == place.run("filter m.toml --observations both.csv --inputs same.csv --quiet").out);
+  CHECK_THAT(place.run("compare m.toml nile --observations y.csv --inputs same.csv --quiet").out,
+             Catch::Contains("log_evidence_2"));
+}
+
 TEST_CASE("weak: several horizons and payoffs from one tree") {
   const Workplace place;
   const auto rows = rows_of(place,

@@ -180,3 +180,32 @@ TEST_CASE("times that a double does not tell apart are refused, not repeated") {
     CHECK(w.length() > 0);
   }
 }
+
+TEST_CASE("steps end where a coefficient jumps") {
+  ObservationPath path;
+  path.dimension = 1;
+  for (const double t : {0.0, 1.0, 2.0, 4.0}) path.append(t, std::vector{t});
+  const std::vector<double> jumps{0.25, 1, 2.5, 3, 9};
+  ObservationWindow window;
+  std::vector<double> ends, observed;
+  for (const ObservationTiming timing : {ObservationTiming::current, ObservationTiming::previous}) {
+    ObservationPath late = path;
+    if (timing == ObservationTiming::previous) late.values[0] = std::numeric_limits<double>::quiet_NaN();
+    const ObservationWindows windows(late, ObservationKind::discrete, timing, 4, jumps);
+    ends.clear();
+    observed.clear();
+    for (std::size_t j = 0; j < windows.size(); ++j) {
+      windows.get(j, window);
+      if (window.length() == 0) continue;
+      ends.push_back(window.end);
+      if (!window.observation.empty()) observed.push_back(window.end);
+    }
+    CHECK(ends == std::vector<double>{0.25, 1, 2, 2.5, 3, 4});
+    CHECK(observed == (timing == ObservationTiming::current ? std::vector<double>{1, 2, 4}
+                                                            : std::vector<double>{0.25, 2, 2.5}));
+  }
+  // Of a path at the first row from there on.
+  CHECK(rows_with_jumps({0, 3}, path.times, jumps) == std::vector<std::size_t>{0, 1, 3});
+  CHECK(rows_with_jumps({0, 3}, path.times, std::vector<double>{1.5}) == std::vector<std::size_t>{0, 2, 3});
+  CHECK(rows_with_jumps({0, 3}, path.times, {}) == std::vector<std::size_t>{0, 3});
+}

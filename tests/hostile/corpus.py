@@ -210,6 +210,15 @@ def option_cases():
                 base = {"--horizon": "1", "--steps": "10", "--observations": "-"}
                 base[option] = value
                 yield Case(f"simulate {option} {value!r}", ["simulate", "m.toml", *[word for pair in base.items() for word in pair]], {"m.toml": MODEL})
+    driven = DISCRETE.replace("[state]", '[inputs]\nu = { between = "previous" }\n[state]').replace("-a*x", "u - a*x")
+    for name, text in {"good": "t,u\n0,1\n0.1,2\n0.3,3\n", "empty": "", "no column": "t,v\n0,1\n", "no rows": "t,u\n", "nan": "t,u\n0,nan\n1,2\n", "inf": "t,u\n0,1\n0.3,inf\n",
+                       "unsorted": "t,u\n0,1\n0.2,2\n0.1,3\n", "short": "t,u\n0,1\n0.2,2\n", "late": "t,u\n0.1,1\n0.3,2\n", "cut off": "t,u\n0,1\n0.3,", "twice": "t,u,u\n0,1,2\n",
+                       "bytes": b"t,u\n0,\xff\x00\n", "wide": "t,u" + ",z" * 100000 + "\n0,1" + ",2" * 100000 + "\n", "huge": "t,u\n0,1e308\n0.1,-1e308\n0.3,1e308\n",
+                       "tiny steps": "t,u\n0,1\n5e-324,2\n0.3,3\n", "many jumps": "t,u\n" + "".join(f"{i / 1e5},{i % 2}\n" for i in range(30001))}.items():
+        codes = {"good": (0,), "huge": (0, 1, 2), "tiny steps": (0, 1, 2), "many jumps": (0,)}.get(name, (2,))
+        yield Case(f"inputs {name}", ["filter", "m.toml", "--observations", "Y.csv", "--inputs", "u.csv", "--quiet"], {"m.toml": driven, "Y.csv": ROWS, "u.csv": text}, codes=codes, named=name in ("nan", "cut off"))
+    yield Case("inputs of a directory", ["filter", "m.toml", "--observations", "Y.csv", "--inputs", "."], {"m.toml": driven, "Y.csv": ROWS}, codes=(2,))
+    yield Case("inputs that are the output", ["filter", "m.toml", "--observations", "Y.csv", "--inputs", "u.csv", "--output", "u.csv"], {"m.toml": driven, "Y.csv": ROWS, "u.csv": "t,u\n0,1\n1,2\n"}, codes=(2,))
     for rows in ["[[1]]", "[[2]]", "[[1, 0], [0, 1]]", "[]", "[[]]", "1", '[["x"]]', '[["1/0"]]', "[[nan]]", "[[" + "1," * 100000 + "1]]"]:
         codes = (0,) if rows == "[[1]]" else (2,)
         yield Case(f"correlation {rows[:20]}", ["model", "show", "m.toml"], {"m.toml": MODEL + f"[noise]\ncorrelation = {rows}\n"}, codes=codes)

@@ -72,6 +72,32 @@ def test_correlated_brownian_motions():
         wt.Model(model, set={"rho": 1.5})
 
 
+INPUTS = OU.replace("[state]", '[inputs]\nu = { between = "linear" }\n[state]').replace("-theta*x", "theta*(u - x)")
+
+
+def test_inputs_are_functions_of_time():
+    model = wt.Model(INPUTS)
+    assert model.analysis()["inputs"] == {"u": "linear"}
+    assert model.inputs == (None, {})
+    with pytest.raises(wt.InputError, match="the input u of this model has no values"):
+        wt.weak(model, "x", horizon=1, steps=2)
+    known = model.with_inputs([0, 1, 2], u=np.array([1.0, 3.0, 0.0]))
+    # x' = (u - x)/2 from 1, u = 1 + 2 t: x = 2 t - 3 + 4 exp(-t/2)
+    expected = 2 - 3 + 4 * np.exp(-0.5)
+    assert wt.weak(known, "x", horizon=1, steps=4).value == pytest.approx(expected, abs=1e-9)
+    assert wt.weak(known.replace(theta=0.5), "x", horizon=1, steps=4).value == pytest.approx(expected, abs=1e-9)
+    again = pickle.loads(pickle.dumps(known))
+    assert np.array_equal(again.inputs[0], [0, 1, 2]) and np.array_equal(again.inputs[1]["u"], [1, 3, 0])
+    drawn = wt.simulate(known, horizon=2, steps=200, keep=20)
+    assert np.isfinite(wt.filter(known, drawn).log_evidence).all()
+    with pytest.raises(wt.InputError, match="the observations end at t = 3"):
+        wt.filter(known, ([0.0, 1.0, 3.0], [0.0, 0.1, 0.2]))
+    with pytest.raises(wt.InputError, match="row 2, column t"):
+        model.with_inputs([0, 0, 1], u=[1, 2, 3])
+    with pytest.raises(wt.InputError, match="no such input"):
+        model.with_inputs([0, 1], u=[1, 2], v=[1, 2])
+
+
 def test_parameters_are_replaced():
     model = wt.Model(OU, set={"theta": 2})
     assert model.parameters == {"theta": 2}

@@ -17,8 +17,11 @@ using Eigen::Index;
 
 class Assembly {
  public:
-  Assembly(const ModelSource& source, const FieldExpressions& bound, const std::vector<double>& parameters)
-      : source_(source), bound_(bound), parameters_(parameters) {}
+  Assembly(const ModelSource& source, const FieldExpressions& bound, const std::vector<double>& parameters,
+           std::shared_ptr<const InputFunctions> inputs)
+      : source_(source), bound_(bound), parameters_(parameters) {
+    model_.inputs = std::move(inputs);
+  }
 
   Model operator()() {
     model_.name = source_.name;
@@ -29,11 +32,10 @@ class Assembly {
     if (model_.has_clock) {
       model_.state_names.emplace_back("t");
       model_.bounds.emplace_back();
-      model_.initial.push_back(0);
     }
     add_initial();
-    model_.fields = std::make_shared<TextFields>(bound_, model_.bounds);
-    check_start();
+    model_.fields = std::make_shared<TextFields>(bound_, model_.bounds, model_.inputs);
+    if (!model_.inputs || model_.inputs->known()) check_start();
     add_observation();
     return std::move(model_);
   }
@@ -75,7 +77,7 @@ class Assembly {
         throw InputError("the start is given twice, and differently in [initial]", initial->location.text(),
                          fmt::format("{} and {}", start_value(*initial, i), start.back()));
     }
-    if (model_.has_clock) start.push_back(0);
+    if (model_.has_clock) start.push_back(model_.inputs ? model_.clock(model_.inputs->first_time()) : 0);
     model_.initial = std::move(start);
     if (source_.initial) add_law(*source_.initial, d);
   }
@@ -135,14 +137,15 @@ class Assembly {
     model_.timing = observation.timing;
     if (observation.kind != ObservationKind::discrete) return;
     if (bound_.log_likelihood) {
-      TapeBuilder builder(bound_.d, bound_.observation_components);
-      const BoundedStates states(model_.bounds, builder);
+      const std::size_t columns = model_.inputs ? model_.inputs->columns() : 0;
+      TapeBuilder builder(bound_.d + columns, bound_.observation_components);
+      const BoundedStates states(model_.bounds, builder, model_.inputs.get(), bound_.d);
       TapeSymbols symbols = states.symbols();
       for (std::size_t i = 0; i < bound_.observation_components; ++i)
         symbols.observations.push_back(builder.uniform(i));
       const TapeBuilder::Value output = emit(*bound_.log_likelihood, symbols, builder, ZeroLogZero::zero);
       model_.density = make_tape_density(builder.finish(std::span(&output, 1)),
-                                         observation.log_likelihood->location.text());
+                                         observation.log_likelihood->location.text(), model_.inputs);
       return;
     }
     std::vector<NoiseLaw> laws;
@@ -175,8 +178,8 @@ class Assembly {
 }  // namespace
 
 Model assemble(const ModelSource& source, const FieldExpressions& bound,
-               const std::vector<double>& parameters) {
-  return Assembly(source, bound, parameters)();
+               const std::vector<double>& parameters, std::shared_ptr<const InputFunctions> inputs) {
+  return Assembly(source, bound, parameters, std::move(inputs))();
 }
 
 }  // namespace wienertree::text

@@ -5,8 +5,8 @@
 
 namespace wienertree::text {
 
-/// All but the exact filter. @throws InputError naming the place
+/// All but the exact filter. inputs: null without any. @throws InputError naming the place
 Model assemble(const ModelSource& source, const FieldExpressions& bound,
-               const std::vector<double>& parameters);
+               const std::vector<double>& parameters, std::shared_ptr<const InputFunctions> inputs);
 
 }  // namespace wienertree::text

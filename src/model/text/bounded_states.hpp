@@ -8,10 +8,19 @@
 
 namespace wienertree::text {
 
+/// Inputs from first_column on are the columns of the functions of time: t is read there, not off the clock.
+inline void take_columns(TapeSymbols& symbols, TapeBuilder& builder, const InputFunctions& known,
+                         std::size_t first_column) {
+  symbols.states.back() = builder.input(first_column);
+  for (std::size_t c = 1; c < known.columns(); ++c) symbols.inputs.push_back(builder.input(first_column + c));
+}
+
 /// Inputs 0 .. d-1 of the tape are the states.
 class BoundedStates {
  public:
-  BoundedStates(const std::vector<StateBound>& bounds, TapeBuilder& builder)
+  /// known: the model's functions of time, or null; their columns are the tape's inputs from first_column on.
+  BoundedStates(const std::vector<StateBound>& bounds, TapeBuilder& builder, const InputFunctions* known,
+                std::size_t first_column)
       : bounds_(bounds), builder_(builder) {
     for (std::size_t i = 0; i < bounds.size(); ++i) {
       const Value x = builder.input(i);
@@ -31,6 +40,7 @@ class BoundedStates {
         if (bounds[i].boundary == Boundary::absorb) multiply(alive_[i], positive(upper, x));
       }
     }
+    if (known != nullptr) take_columns(symbols_, builder, *known, first_column);
   }
 
   using Value = TapeBuilder::Value;

@@ -136,7 +136,7 @@ class Derivation {
 
   void add_clock() {
     const ex t = symbols_.state(d_);
-    bool used = log_likelihood_.has(t);
+    bool used = !source_.inputs.empty() || log_likelihood_.has(t);
     for (const ex& e : given_drift_) used = used || e.has(t);
     for (const exvector& V : diffusion_)
       for (const ex& e : V) used = used || e.has(t);
@@ -150,8 +150,14 @@ class Derivation {
 
   const SourceExpression& source_of(std::size_t k, std::size_t i) const { return source_.coefficient(k, i); }
 
+  // By the clock also along the inputs, which are functions of it, linear or constant piece by piece.
   ex derivative(const ex& e, std::size_t l, const SourceExpression& place) {
-    return budget_.derivative(e, symbols_.state(l), place);
+    ex result = budget_.derivative(e, symbols_.state(l), place);
+    if (l == source_.states.size())
+      for (std::size_t k = 0; k < symbols_.inputs(); ++k)
+        if (e.has(symbols_.input(2 * k)))
+          result += budget_.derivative(e, symbols_.input(2 * k), place) * symbols_.input(2 * k + 1);
+    return result;
   }
 
   // What derivatives leave often cancels when it is expanded: the shorter of the two forms.
@@ -193,7 +199,8 @@ class Derivation {
       for (std::size_t i = 0; i < d_; ++i) V.push_back(converted(V_[k][i], source_of(k, i)));
       for (std::size_t i = 0; i < d_; ++i)
         for (std::size_t l = 0; l < d_; ++l) {
-          const bool depends = contains(V[i], Role::state, l);
+          const bool depends =
+              contains(V[i], Role::state, l) || (l == source_.states.size() && contains(V[i], Role::input));
           jacobian.push_back(depends ? converted_derivative(V_[k][i], l, source_of(k, i))
                                      : result_.arena->number(0));
         }

@@ -22,6 +22,7 @@ class Emission {
   TapeBuilder::Value make(Expression e) {
     switch (e->kind) {
       case Node::Kind::symbol:
+        if (e->role == Role::input) return symbols_.inputs.at(e->index);
         return e->role == Role::state ? symbols_.states.at(e->index) : symbols_.observations.at(e->index);
       case Node::Kind::power:
         return builder_.binary(Op::power, (*this)(e->operands[0]), (*this)(e->operands[1]));

@@ -42,6 +42,7 @@ Difference bounds(const ExactFilterQuestion& question) {
 Difference not_linear_gaussian(const ExactFilterQuestion& question) {
   const FieldExpressions& bound = question.bound;
   if (Difference difference = bounds(question); !difference.empty()) return difference;
+  if (question.model.inputs) return "there are inputs";
   for (std::size_t i = 0; i < bound.d; ++i)
     for (std::size_t j = 1; j <= bound.p; ++j)
       if (!bound.fields[j][i]->is_number())

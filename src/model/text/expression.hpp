@@ -15,8 +15,9 @@
 
 namespace wienertree::text {
 
-/// What a name stands for. The clock `t` is the state after the last declared one.
-enum class Role : std::uint8_t { parameter, state, observation };
+/// What a name stands for. The clock `t` is the state after the last declared one. Input k is a known function of
+/// time, its value with the index 2k and its slope with 2k + 1.
+enum class Role : std::uint8_t { parameter, state, observation, input };
 
 struct Node;
 /// Equal expressions of one arena are the same pointer. Valid as long as the arena.
@@ -97,6 +98,7 @@ bool is_piecewise(Expression e);
 /// What the symbols of a bound expression are on a tape.
 struct TapeSymbols {
   std::vector<TapeBuilder::Value> states, observations;
+  std::vector<TapeBuilder::Value> inputs;  ///< value and slope of each
 };
 /// What 0 log(0) is. In log densities of counts, y log(m) - m and the like, it is the limit 0.
 enum class ZeroLogZero { nan, zero };

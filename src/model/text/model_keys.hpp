@@ -6,10 +6,11 @@
 
 namespace wienertree::text {
 
-inline constexpr std::array<FileKey, 10> model_keys{{
+inline constexpr std::array<FileKey, 11> model_keys{{
     {"name", "text", "the file's name", "what the model is called"},
     {"convention", "\"ito\" or \"stratonovich\"", "required", "how [drift] is meant"},
     {"parameters", "NAME = number or expression", "none", "of the parameters above it; --set changes them"},
+    {"inputs", "NAME = table", "none", "known functions of time, given in a file"},
     {"state", "NAME = table", "required", "a component each, in the order of the file"},
     {"drift", "STATE = expression", "required", "one for each state"},
     {"diffusion", "STATE = list of expressions", "required", "for each state one for each Brownian motion"},
@@ -17,6 +18,11 @@ inline constexpr std::array<FileKey, 10> model_keys{{
     {"observation", "table", "nothing is observed", "what is observed of the signal"},
     {"initial", "table", "a fixed start", "a Gaussian start"},
     {"exact", "table", "found out", "an exact filter that the model is claimed to have, which is checked"},
+}};
+
+inline constexpr std::array<FileKey, 1> input_keys{{
+    {"between", "\"linear\" or \"previous\"", "required",
+     "what it is between two times: on the line from one value to the next, or still the previous value"},
 }};
 
 inline constexpr std::array<FileKey, 4> state_keys{{

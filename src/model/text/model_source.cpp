@@ -35,7 +35,34 @@ std::vector<NamedExpression> read_parameters(const Section& section) {
   return result;
 }
 
-std::vector<StateSource> read_states(const Section& section, const std::vector<NamedExpression>& parameters) {
+bool is_observation_name(std::string_view name) {
+  return name.size() > 1 && name[0] == 'y' &&
+         name.find_first_not_of("0123456789", 1) == std::string_view::npos;
+}
+
+std::vector<InputSource> read_inputs(const Section& section, const std::vector<NamedExpression>& parameters) {
+  std::vector<InputSource> result;
+  for (const std::string& name : section.keys()) {
+    const Section entry = section.section(name);
+    InputSource input{name, section.location(name), Between::linear};
+    check_name(name, input.location);
+    for (const NamedExpression& parameter : parameters)
+      if (parameter.name == name)
+        throw InputError("this name is already that of a parameter", input.location.text(), name);
+    if (is_observation_name(name))
+      throw InputError("y1, y2, .. are the columns of observations; rename this", input.location.text(),
+                       name);
+    entry.only(input_keys);
+    constexpr std::array kinds{Between::linear, Between::previous};
+    input.between = kinds.at(entry.choice("between", {"linear", "previous"}));
+    result.push_back(std::move(input));
+  }
+  if (result.empty()) throw InputError("names at least one input", section.location().text());
+  return result;
+}
+
+std::vector<StateSource> read_states(const Section& section, const std::vector<NamedExpression>& parameters,
+                                     const std::vector<InputSource>& inputs) {
   std::vector<StateSource> result;
   for (const std::string& name : section.keys()) {
     const Section entry = section.section(name);
@@ -46,6 +73,9 @@ std::vector<StateSource> read_states(const Section& section, const std::vector<N
     for (const NamedExpression& parameter : parameters)
       if (parameter.name == name)
         throw InputError("this name is already that of a parameter", state.location.text(), name);
+    for (const InputSource& input : inputs)
+      if (input.name == name)
+        throw InputError("this name is already that of an input", state.location.text(), name);
     entry.only(state_keys);
     if (entry.has("initial")) state.initial = entry.expression("initial");
     if (entry.has("lower")) state.lower = entry.expression("lower");
@@ -198,7 +228,8 @@ ModelSource read(const toml::table& table, const TomlFile& file) {
   model.convention =
       root.choice("convention", {"ito", "stratonovich"}) == 0 ? Convention::ito : Convention::stratonovich;
   if (root.has("parameters")) model.parameters = read_parameters(root.section("parameters"));
-  model.states = read_states(root.section("state"), model.parameters);
+  if (root.has("inputs")) model.inputs = read_inputs(root.section("inputs"), model.parameters);
+  model.states = read_states(root.section("state"), model.parameters, model.inputs);
   read_dynamics(root, model);
   if (root.has("noise")) model.correlation = read_correlation(root.section("noise"), model.noise_dimension());
   if (root.has("observation")) model.observation = read_observation(root.section("observation"));
@@ -219,8 +250,9 @@ void add_integral(ModelSource& source, const std::string& name, const std::strin
   check_name(name, place);
   const auto has_name = [&](const auto& named) { return named.name == name; };
   if (std::any_of(source.states.begin(), source.states.end(), has_name) ||
-      std::any_of(source.parameters.begin(), source.parameters.end(), has_name))
-    throw InputError("this name is already that of a state or a parameter", place.text(), name);
+      std::any_of(source.parameters.begin(), source.parameters.end(), has_name) ||
+      std::any_of(source.inputs.begin(), source.inputs.end(), has_name))
+    throw InputError("this name is already that of a state, a parameter or an input", place.text(), name);
   const SourceExpression zero{"0", place, false};
   StateSource state;
   state.name = name;

@@ -7,6 +7,7 @@
 #include <string_view>
 #include <vector>
 
+#include "wienertree/model/input_functions.hpp"
 #include "wienertree/model/model.hpp"
 #include "wienertree/model/text/location.hpp"
 
@@ -15,6 +16,12 @@ namespace wienertree::text {
 struct NamedExpression {
   std::string name;
   SourceExpression value;
+};
+
+struct InputSource {
+  std::string name;
+  Location location;
+  Between between = Between::linear;
 };
 
 struct StateSource {
@@ -67,6 +74,7 @@ struct ModelSource {
   std::string file, name;
   Convention convention = Convention::ito;
   std::vector<NamedExpression> parameters;
+  std::vector<InputSource> inputs;
   std::vector<StateSource> states;                       ///< d
   std::vector<SourceExpression> drift;                   ///< d
   std::vector<std::vector<SourceExpression>> diffusion;  ///< d lists of p

@@ -21,8 +21,14 @@ inline std::vector<std::string> names(const std::vector<StateSource>& list) {
   return result;
 }
 
+inline std::vector<std::string> names(const std::vector<InputSource>& list) {
+  std::vector<std::string> result;
+  for (const InputSource& entry : list) result.push_back(entry.name);
+  return result;
+}
+
 inline Symbols symbols_of(const ModelSource& source) {
-  return {names(source.parameters), names(source.states)};
+  return {names(source.parameters), names(source.states), names(source.inputs)};
 }
 
 // What the algebra makes of valid input may still have a pole or leave the real numbers.

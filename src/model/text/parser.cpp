@@ -282,9 +282,11 @@ class Parser {
     }
     const Symbols::Entry* entry = scope_.symbols.find(token.text);
     if (entry == nullptr) fail_unknown(token);
-    if (entry->role == Role::state && !scope_.states)
+    if (entry->role != Role::parameter && !scope_.states)
       fail(fmt::format("{} cannot be used here, only numbers and parameters can",
-                       entry->name == "t" ? "time" : "a state"),
+                       entry->role == Role::input ? "an input"
+                       : entry->name == "t"       ? "time"
+                                                  : "a state"),
            token, entry->name);
     if (entry->role == Role::parameter && entry->index >= scope_.parameters)
       fail("a parameter may refer to earlier parameters only", token, entry->name);
@@ -299,7 +301,8 @@ class Parser {
       known.emplace_back(function.name);
     }
     for (const Symbols::Entry& entry : scope_.symbols.entries())
-      if (entry.role == Role::state ? scope_.states : entry.index < scope_.parameters)
+      if (entry.role == Role::parameter ? entry.index < scope_.parameters
+                                        : scope_.states && is_identifier(entry.name))
         known.push_back(entry.name);
     fail("unknown name" + suggestion(token.text, known), token, std::string(token.text.substr(0, 80)));
   }

@@ -28,12 +28,16 @@ class Symbols {
     std::size_t index;
     GiNaC::realsymbol symbol;
   };
-  /// The clock `t` is added as the state after the declared ones.
-  Symbols(const std::vector<std::string>& parameters, const std::vector<std::string>& states);
+  /// The clock `t` is added as the state after the declared ones. The slope of an input u is called u'.
+  Symbols(const std::vector<std::string>& parameters, const std::vector<std::string>& states,
+          const std::vector<std::string>& inputs = {});
 
   const GiNaC::realsymbol& parameter(std::size_t i) const { return entries_[i].symbol; }
   /// i = number of declared states: the clock.
   const GiNaC::realsymbol& state(std::size_t i) const { return entries_[parameters_ + i].symbol; }
+  /// Value of input k for i = 2k, its slope for i = 2k + 1.
+  const GiNaC::realsymbol& input(std::size_t i) const { return entries_[first_input_ + i].symbol; }
+  std::size_t inputs() const { return (entries_.size() - first_input_) / 2; }
   /// Component i of y, from 0; it is written y1 for i = 0.
   const GiNaC::realsymbol& observation(std::size_t i);
   /// How many components of y were asked for: the largest plus one.
@@ -45,7 +49,7 @@ class Symbols {
   const Entry& entry(const GiNaC::symbol& symbol) const;
 
  private:
-  std::size_t parameters_;
+  std::size_t parameters_, first_input_;
   std::deque<Entry> entries_, observations_;
   std::map<GiNaC::ex, const Entry*, GiNaC::ex_is_less> known_;
 };
@@ -54,7 +58,7 @@ class Symbols {
 struct Scope {
   Symbols& symbols;
   std::size_t parameters;     ///< the first so many
-  bool states = false;        ///< states and t
+  bool states = false;        ///< states, inputs and t
   bool observations = false;  ///< y1, y2, ..
 };
 

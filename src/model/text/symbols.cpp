@@ -9,8 +9,9 @@ std::mutex& symbolic_mutex() {
   return mutex;
 }
 
-Symbols::Symbols(const std::vector<std::string>& parameters, const std::vector<std::string>& states)
-    : parameters_(parameters.size()) {
+Symbols::Symbols(const std::vector<std::string>& parameters, const std::vector<std::string>& states,
+                 const std::vector<std::string>& inputs)
+    : parameters_(parameters.size()), first_input_(parameters.size() + states.size() + 1) {
   const auto add = [this](const std::string& name, Role role, std::size_t index) {
     entries_.push_back({name, role, index, GiNaC::realsymbol(name)});
     known_.emplace(entries_.back().symbol, &entries_.back());
@@ -18,6 +19,10 @@ Symbols::Symbols(const std::vector<std::string>& parameters, const std::vector<s
   for (std::size_t i = 0; i < parameters.size(); ++i) add(parameters[i], Role::parameter, i);
   for (std::size_t i = 0; i < states.size(); ++i) add(states[i], Role::state, i);
   add("t", Role::state, states.size());
+  for (std::size_t k = 0; k < inputs.size(); ++k) {
+    add(inputs[k], Role::input, 2 * k);
+    add(inputs[k] + "'", Role::input, 2 * k + 1);
+  }
 }
 
 const GiNaC::realsymbol& Symbols::observation(std::size_t i) {

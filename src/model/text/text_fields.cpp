@@ -12,22 +12,6 @@ namespace {
 
 using Value = TapeBuilder::Value;
 
-// out component i = output i of the tape.
-void run(const Tape& tape, ConstBatchView x, ConstBatchView more, std::span<const double> uniforms,
-         BatchView out) {
-  assert(out.components() == tape.outputs() && out.nodes() == x.nodes());
-  thread_local std::vector<const double*> inputs;
-  thread_local std::vector<double*> outputs;
-  inputs.clear();
-  outputs.clear();
-  for (std::size_t i = 0; i < x.components(); ++i) inputs.push_back(x.component(i).data());
-  for (std::size_t i = 0; i < more.components(); ++i) inputs.push_back(more.component(i).data());
-  for (std::size_t i = 0; i < out.components(); ++i) outputs.push_back(out.component(i).data());
-  tape.evaluate(inputs, uniforms, outputs, x.nodes());
-}
-
-void run(const Tape& tape, ConstBatchView x, BatchView out) { run(tape, x, ConstBatchView(), {}, out); }
-
 }  // namespace
 
 PatternTapes::PatternTapes(std::size_t inputs, std::size_t fields, const Terms& terms)
@@ -66,13 +50,30 @@ const Tape& PatternTapes::of(std::span<const double> D) const {
   return tapes_[count == 1 ? last : fields_];
 }
 
-TextFields::TextFields(const FieldExpressions& bound, const std::vector<StateBound>& bounds)
-    : d_(bound.d), p_(bound.p), k_(bound.sensor.size()) {
+// out component i = output i of the tape.
+void TextFields::run(const Tape& tape, ConstBatchView x, ConstBatchView more,
+                     std::span<const double> uniforms, BatchView out) const {
+  assert(out.components() == tape.outputs() && out.nodes() == x.nodes());
+  thread_local std::vector<const double*> inputs;
+  thread_local std::vector<double*> outputs;
+  inputs.clear();
+  outputs.clear();
+  for (std::size_t i = 0; i < x.components(); ++i) inputs.push_back(x.component(i).data());
+  for (std::size_t i = 0; i < more.components(); ++i) inputs.push_back(more.component(i).data());
+  if (inputs_) inputs_->append(x.component(d_ - 1), inputs);
+  for (std::size_t i = 0; i < out.components(); ++i) outputs.push_back(out.component(i).data());
+  tape.evaluate(inputs, uniforms, outputs, x.nodes());
+}
+
+TextFields::TextFields(const FieldExpressions& bound, const std::vector<StateBound>& bounds,
+                       std::shared_ptr<const InputFunctions> known)
+    : d_(bound.d), p_(bound.p), k_(bound.sensor.size()), inputs_(std::move(known)) {
+  const std::size_t columns = inputs_ ? inputs_->columns() : 0;
   for (std::size_t i = 0; i < d_; ++i)
     if (bounds[i].bounded() && bounds[i].boundary == Boundary::absorb) absorbing_.push_back({i, bounds[i]});
   const auto sum_over_fields = [&](const std::vector<std::vector<Expression>>& coefficients, auto&& factor) {
     return [&coefficients, factor, &bounds, this](TapeBuilder& builder, const std::vector<bool>& used) {
-      const BoundedStates states(bounds, builder);
+      const BoundedStates states(bounds, builder, inputs_.get(), d_);
       std::vector<Value> outputs;
       for (std::size_t entry = 0; entry < coefficients.front().size(); ++entry) {
         Value sum = builder.constant(0);
@@ -86,19 +87,19 @@ TextFields::TextFields(const FieldExpressions& bound, const std::vector<StateBou
       return outputs;
     };
   };
-  direct_ = PatternTapes(d_, 1 + p_,
+  direct_ = PatternTapes(d_ + columns, 1 + p_,
                          sum_over_fields(bound.fields, [](TapeBuilder&, const BoundedStates&, std::size_t,
                                                           Value value) { return value; }));
   jacobian_ = PatternTapes(
-      d_, 1 + p_,
+      d_ + columns, 1 + p_,
       sum_over_fields(bound.jacobians, [d = d_](TapeBuilder& builder, const BoundedStates& states,
                                                 std::size_t entry, Value value) {
         return builder.binary(Op::multiply, states.slope(entry % d), value);
       }));
 
   const auto tape_of = [&](std::size_t inputs, std::size_t uniforms, auto&& outputs_of) {
-    TapeBuilder builder(inputs, uniforms);
-    const BoundedStates states(bounds, builder);
+    TapeBuilder builder(inputs + columns, uniforms);
+    const BoundedStates states(bounds, builder, inputs_.get(), inputs);
     std::vector<Value> outputs;
     outputs_of(builder, states, outputs);
     return builder.finish(outputs);

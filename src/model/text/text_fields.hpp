@@ -1,6 +1,7 @@
 #pragma once
 /// Vector fields whose coefficients are expressions, evaluated by tapes.
 #include <functional>
+#include <memory>
 #include <optional>
 #include <vector>
 
@@ -34,8 +35,9 @@ class PatternTapes {
 /// Euler steps end at the nearest point inside.
 class TextFields final : public VectorFields {
  public:
-  /// bounds: d entries.
-  TextFields(const FieldExpressions& bound, const std::vector<StateBound>& bounds);
+  /// bounds: d entries. inputs: null without any.
+  TextFields(const FieldExpressions& bound, const std::vector<StateBound>& bounds,
+             std::shared_ptr<const InputFunctions> inputs);
 
   std::size_t state_dimension() const override { return d_; }
   std::size_t noise_dimension() const override { return p_; }
@@ -53,9 +55,15 @@ class TextFields final : public VectorFields {
   void exact_flow(std::span<const double> D, BatchView x) const override;
 
  private:
+  void run(const Tape& tape, ConstBatchView x, ConstBatchView more, std::span<const double> uniforms,
+           BatchView out) const;
+  void run(const Tape& tape, ConstBatchView x, BatchView out) const {
+    run(tape, x, ConstBatchView(), {}, out);
+  }
   void freeze(ConstBatchView x, std::size_t rows_per_component, BatchView out) const;
 
   std::size_t d_, p_, k_;
+  std::shared_ptr<const InputFunctions> inputs_;
   std::vector<std::pair<std::size_t, StateBound>> absorbing_;
   PatternTapes direct_, jacobian_;
   Tape euler_step_, ito_drift_, diffusion_, sensor_, sensor_derivative_;
