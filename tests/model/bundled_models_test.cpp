@@ -111,6 +111,32 @@ std::map<std::string, ByHand> models_by_hand() {
                    0,
                    ExactFilter::none,
                    false};
+  const double elasticity = 0.75, cev = 0.2 * std::pow(100, 0.25);
+  models["cev"] = {
+      {[=](const Point& x) {
+         return Point{0.05 * x[0] - 0.5 * elasticity * cev * cev * std::pow(x[0], 2 * elasticity - 1)};
+       },
+       [=](const Point& x) { return Point{cev * std::pow(x[0], elasticity)}; }},
+      none,
+      0,
+      ExactFilter::none,
+      false};
+  // beta = .7, nu = .4, rho = -.3: the corrections are -a^2 beta f^(2 beta - 1)/2 - nu rho a f^beta/2 and -nu^2 a/2.
+  models["sabr"] = {{[](const Point& x) {
+                       return Point{
+                           -0.35 * x[1] * x[1] * std::pow(x[0], 0.4) + 0.06 * x[1] * std::pow(x[0], 0.7),
+                           -0.08 * x[1]};
+                     },
+                     [](const Point& x) {
+                       return Point{x[1] * std::pow(x[0], 0.7), -0.12 * x[1]};
+                     },
+                     [](const Point& x) {
+                       return Point{0, 0.4 * std::sqrt(0.91) * x[1]};
+                     }},
+                    none,
+                    0,
+                    ExactFilter::none,
+                    false};
   models["gbm"] = {{[](const Point& x) { return Point{(0.05 - 0.02) * x[0]}; },
                     [](const Point& x) { return Point{0.2 * x[0]}; }},
                    none,
