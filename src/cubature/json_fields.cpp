@@ -88,8 +88,8 @@ const Json& array_at(const Json& object, const char* key, const std::string& whe
 
 double number(const Json& value, const std::string& what, const std::string& where) {
   if (!value.is_number()) throw InputError(fmt::format("{} must be a number", what), where, brief(value));
-  return value.get<double>() +
-         0.0;  // -0.0 becomes 0: as text it would be the integer -0, which reads back as 0
+  // -0.0 becomes 0: as text it would be the integer -0, which reads back as 0.
+  return value.get<double>() + 0.0;
 }
 
 std::string quoted(const std::string& text, const char* key, const std::string& where) {
