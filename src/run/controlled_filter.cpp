@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "wienertree/run/window_source.hpp"
 
@@ -11,6 +12,13 @@ namespace wienertree {
 namespace {
 
 constexpr int most_levels = 12;
+constexpr const char* work_is_spent = "the work is spent";
+
+// Runs beside the answer, in the order in which they are made.
+constexpr std::pair<RunRole, const char*> guards[] = {
+    {RunRole::steps, "other steps"},     {RunRole::nodes, "half the nodes"},
+    {RunRole::degree, "another degree"}, {RunRole::rows, "other functionals of the rows"},
+    {RunRole::launch_1, "another seed"}, {RunRole::launch_2, "another seed"}};
 
 // Every interval between `coarse` in 2^halvings parts, at the nearest rows, as far as there are rows.
 std::vector<std::size_t> refined(std::span<const double> times, std::vector<std::size_t> coarse,
@@ -262,8 +270,7 @@ bool ControlledFilter::affordable(int level) const {
 }
 
 std::optional<ControlledFilter::Plan> ControlledFilter::next_guard(int level) const {
-  for (const RunRole role :
-       {RunRole::steps, RunRole::nodes, RunRole::degree, RunRole::rows, RunRole::launch_1, RunRole::launch_2})
+  for (const auto& [role, name] : guards)
     if (applies(role) && find(role, level) == nullptr) return plan(role, level);
   return {};
 }
@@ -349,7 +356,7 @@ bool ControlledFilter::advance() {
   if (run.next % 16 == 0 && answer_level() >= 1) {
     const double work = work_ + work_of(run.launches.statistics(), model_.reported_dimension());
     if (work > 1.2 * control_.work) {
-      run.result.failure = "the work is spent";
+      run.result.failure = work_is_spent;
       finish();
     }
   }
@@ -374,6 +381,21 @@ ObservationWindows ControlledFilter::answer_windows() const {
   return plan(RunRole::level, answer_level()).windows;
 }
 
+// The guard of the answer that did not come to its end, and why.
+std::string ControlledFilter::missing_guard() const {
+  const int level = answer_level(), guarded = setup_.random || alone() ? level : level - 1;
+  for (const auto& [role, name] : guards) {
+    if (!applies(role)) continue;
+    const FinishedRun* run = find(role, guarded);
+    if (run == nullptr || run->failed())
+      return fmt::format("the run with {} did not end: {}", name,
+                         run == nullptr ? work_is_spent : run->failure);
+  }
+  return {};
+}
+
+// Where the answer is within the tolerance but for a guard that is missing, its error is not known; beyond the
+// tolerance it is known to be so.
 Accuracy ControlledFilter::accuracy() const {
   Accuracy a;
   a.rows = errors_of(answer_level());
@@ -381,6 +403,7 @@ Accuracy ControlledFilter::accuracy() const {
   a.rows.resize(answer().rows.size());
   a.error = largest(a.rows);
   a.reached = a.known && a.error.within(control_.tolerance);
+  if (a.reached && !missing_guard().empty()) a.known = a.reached = false;
   return a;
 }
 
@@ -388,10 +411,12 @@ std::vector<std::string> ControlledFilter::warnings() const {
   std::vector<std::string> all;
   for (const FilterWarning& w : answer().warnings) all.push_back(w.text);
   const Accuracy a = accuracy();
-  if (!a.known)
-    all.push_back("the error is not known: no run of another resolution came to its end");
-  else if (!a.reached)
-    all.push_back(above_tolerance(a.error, control_.tolerance));
+  if (!a.known) {
+    const std::string missing = missing_guard();
+    all.push_back("the error is not known: " +
+                  (missing.empty() ? "no run of another resolution came to its end" : missing));
+  }
+  if (a.known && !a.reached) all.push_back(above_tolerance(a.error, control_.tolerance));
   return all;
 }
 

@@ -51,7 +51,7 @@ struct FinishedRun {
 struct Accuracy {
   RowErrors rows;        ///< one per row of the answer
   AnswerError error;     ///< the largest of each part
-  bool known = false;    ///< whether there was any other run to compare with
+  bool known = false;    ///< whether the runs to compare with came to their end
   bool reached = false;  ///< whether the error is within the tolerance
 };
 
@@ -111,6 +111,7 @@ class ControlledFilter {
   int answer_level() const;
   RowErrors difference_of_levels(int level) const;  ///< from the level below; empty where there is none
   RowErrors errors_of(int level) const;
+  std::string missing_guard() const;
   bool affordable(int level) const;
   bool closed_form() const;
   bool alone() const;  ///< whether there is one level only

@@ -2,6 +2,8 @@
 /// run what cannot come of it.
 #include <catch2/catch.hpp>
 #include <filesystem>
+#include <fstream>
+#include <iterator>
 
 #include "program.hpp"
 
@@ -43,6 +45,15 @@ std::string computed(const Outcome& outcome) {
   for (const std::string& line : lines_of(outcome.err))
     if (line.ends_with("computed now")) return line.substr(line.find_first_not_of(' '));
   return outcome.err;
+}
+
+// The formula of degree 7 in `file` as one of degree 5 with another name.
+std::string named_degree_5(const std::string& file, const std::string& name) {
+  std::ifstream in(file);
+  std::string text{std::istreambuf_iterator<char>(in), {}};
+  const std::string old = "{\"name\": \"moment-equations-7-1\", \"degree\": 7";
+  REQUIRE(text.starts_with(old));
+  return "{\"name\": \"" + name + "\", \"degree\": 5" + text.substr(old.size());
 }
 
 }  // namespace
@@ -139,6 +150,12 @@ TEST_CASE(
   CHECK(run() == "3 runs, 1 of them computed now");
   place.write("f.json", formula);
   CHECK(run() == "3 runs, 0 of them computed now");  // its earlier run was kept
+  // Another one of the same name and degree: a formula of degree 7 is one of degree 5 as well.
+  place.write("f.json",
+              named_degree_5(WIENERTREE_SOURCE_DIR "/data/cubature_formulas/moment-equations-7-1.json",
+                             "lyons-victoir-5-1"));
+  CHECK(run() == "3 runs, 1 of them computed now");
+  place.write("f.json", formula);
   // A model that two cells use; then back.
   place.write("other.toml", model + "# changed\n");
   CHECK(run() == "3 runs, 2 of them computed now");

@@ -76,6 +76,7 @@ TEST_CASE("quantiles of atoms at the ends of the range of doubles equal those of
       {0, tiny},                       // the width's reciprocal overflows
       {0, tiny, 3 * tiny, 1e-320},     // nodes of an extinct population
       {-huge, 0, huge},                // the width overflows
+      {-huge, huge},                   // so does the gap between neighbours
       {-huge, -1, 1, huge, 1e308, 5},  // the same, with atoms between
       {tiny, tiny},
       {huge, huge, huge}};

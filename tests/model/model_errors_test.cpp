@@ -204,7 +204,9 @@ TEST_CASE("nesting deeper than the TOML library's stack allows is refused by its
     }
   }
   for (const std::string& text : {"a = " + repeated("[", 33) + repeated("]", 33),
-                                  "a = " + repeated("{ b = ", 33), repeated("[", 100'000)})
+                                  "a = " + repeated("{ b = ", 33), repeated("[", 100'000),
+                                  // A string ends with a quote of its own before the three that close it.
+                                  "a = [\"\"\"b\"\"\"\", " + repeated("[", 33)})
     CHECK(error_of("\n\n" + text).message() == "lists and tables nested deeper than 32 levels");
   // What stands in strings and comments is no nesting, numbers have their points, and limits themselves are kept.
   const std::string deep = repeated("a.", 50) + repeated("[", 50);
