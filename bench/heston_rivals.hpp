@@ -30,4 +30,12 @@ MonteCarloResult quantlib_heston_sobol(const HestonCall& call, std::size_t steps
 MonteCarloResult quantlib_heston_fd(const HestonCall& call, std::size_t time, std::size_t price,
                                     std::size_t variance);
 
+/// The same engine for the digital that pays 1 above the strike.
+MonteCarloResult quantlib_heston_digital_fd(const HestonCall& call, std::size_t time, std::size_t price,
+                                            std::size_t variance);
+
+/// QuantLib's MCEuropeanBasketEngine driven by Sobol numbers for `basket_call` of option_problems.hpp: the law of the
+/// prices at the horizon is drawn in one step, which is exact for them.
+MonteCarloResult quantlib_basket_sobol(std::size_t paths);
+
 }  // namespace wienertree::bench
