@@ -124,6 +124,7 @@ Json report_of(const CompareArguments& a, const std::vector<Contender>& all, con
     model["model"] = all[m].label;
     for (const auto& [name, value] : all[m].model.parameters) model["parameters"][name] = value;
     model["options"] = options_in_force(comparison.setup[m], all[m].model);
+    if (all[m].model.inputs) model["options"]["inputs"] = all[m].model.inputs->origin();
     model["log_evidence"] = rows.back().log_evidence[m];
     if (all[m].setup.launches > 1) model["standard_error"] = rows.back().standard_error[m];
     if (std::isfinite(comparison.error[m])) model["error_log_evidence"] = comparison.error[m];

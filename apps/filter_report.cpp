@@ -115,6 +115,7 @@ Json filter_report(const FilterContext& c, const FilterRun& run) {
   options["tolerance"] = c.control.tolerance;
   options["work"] = c.control.work;
   if (c.highest_moment > 0) options["moments"] = c.highest_moment;
+  if (c.model.inputs) options["inputs"] = c.model.inputs->origin();
   report["options"] = std::move(options);
   report["children"] = run.statistics.children;
   report["ode_solves"] = run.statistics.flow.node_segments;

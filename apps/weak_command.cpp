@@ -51,6 +51,7 @@ Json report_of(const WeakArguments& a, const WeakProblem& problem, const WeakRun
   if (!a.averages.empty()) options["average"] = a.averages;
   if (!a.integrals.empty()) options["integral"] = a.integrals;
   if (a.discount) options["discount"] = *a.discount;
+  if (a.inputs) options["inputs"] = *a.inputs;
   if (a.tolerance) options["tolerance"] = *a.tolerance;
   note_kinks(a, problem, options);
   if (problem.transition) {

@@ -34,6 +34,7 @@ class InputFunctions {
   InputFunctions(std::vector<InputFunction> functions, const std::string& origin);
 
   const std::vector<InputFunction>& functions() const { return functions_; }
+  const std::string& origin() const { return origin_; }
   /// Whether values are known.
   bool known() const { return !functions_.front().times.empty(); }
   /// @throws InputError naming the inputs, if they are not

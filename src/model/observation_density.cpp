@@ -152,6 +152,85 @@ class AdditiveNoise final : public ObservationDensity {
   Tape log_densities_;
 };
 
+class ScaledNoise final : public ObservationDensity {
+ public:
+  ScaledNoise(std::shared_ptr<const VectorFields> fields, std::vector<NoiseLaw> laws, Tape scales,
+              std::string name, std::shared_ptr<const InputFunctions> inputs)
+      : fields_(std::move(fields)),
+        laws_(std::move(laws)),
+        scales_(std::move(scales)),
+        name_(std::move(name)),
+        inputs_(std::move(inputs)) {
+    for (NoiseLaw& law : laws_) law.scale = 1;
+    log_densities_ = log_densities(laws_);
+  }
+
+  std::size_t observation_dimension() const override { return laws_.size(); }
+
+  // log g((y - h)/s) - log s: the tape is given (h - y)/s for h, and 0 for y.
+  void log_density(std::span<const double> y, ConstBatchView x, std::span<double> out) const override {
+    const std::size_t k = laws_.size(), N = x.nodes();
+    thread_local Batch z, scale, densities;
+    z.reshape(k, N);
+    scale.reshape(k, N);
+    densities.reshape(k, N);
+    fields_->sensor(x, z);
+    evaluate_scales(x, scale);
+    thread_local std::vector<const double*> inputs;
+    thread_local std::vector<double*> outputs;
+    thread_local std::vector<double> zero;
+    inputs.clear();
+    outputs.clear();
+    zero.assign(k, 0.0);
+    for (std::size_t i = 0; i < k; ++i) {
+      const std::span<const double> s = scale.component(i);
+      const std::span<double> u = z.component(i);
+      for (std::size_t n = 0; n < N; ++n) u[n] = s[n] > 0 ? (u[n] - y[i]) / s[n] : NAN;
+      inputs.push_back(u.data());
+      outputs.push_back(densities.component(i).data());
+    }
+    log_densities_.evaluate(inputs, zero, outputs, N);
+    std::fill(out.begin(), out.end(), 0.0);
+    for (std::size_t i = 0; i < k; ++i) {
+      if (std::isnan(y[i])) continue;
+      const std::span<const double> term = densities.component(i), s = scale.component(i);
+      for (std::size_t n = 0; n < N; ++n) out[n] += term[n] - std::log(s[n]);
+    }
+  }
+
+  double log_noise_density(std::span<const double>) const override {
+    throw InputError(
+        "the scale of the noise depends on the state, so that there is no law of the noise alone", name_);
+  }
+
+  void sample(std::span<const double> x, std::span<const double> uniforms, std::span<const double> normals,
+              std::span<double> y) const override {
+    const ConstBatchView at{x.data(), x.size(), 1, 1};
+    fields_->sensor(at, {y.data(), y.size(), 1, 1});
+    Batch scale(y.size(), 1);
+    evaluate_scales(at, scale);
+    for (std::size_t i = 0; i < y.size(); ++i) y[i] += scale(i, 0) * draw(laws_[i], uniforms[i], normals[i]);
+  }
+
+ private:
+  void evaluate_scales(ConstBatchView x, BatchView out) const {
+    thread_local std::vector<const double*> inputs;
+    thread_local std::vector<double*> outputs;
+    inputs.clear();
+    outputs.clear();
+    for (std::size_t i = 0; i < x.components(); ++i) inputs.push_back(x.component(i).data());
+    if (inputs_) inputs_->append(x.component(x.components() - 1), inputs);
+    for (std::size_t i = 0; i < out.components(); ++i) outputs.push_back(out.component(i).data());
+    scales_.evaluate(inputs, {}, outputs, x.nodes());
+  }
+
+  std::shared_ptr<const VectorFields> fields_;
+  std::vector<NoiseLaw> laws_;
+  Tape scales_, log_densities_;
+  std::string name_;
+  std::shared_ptr<const InputFunctions> inputs_;
+};
+
 class TapeDensity final : public ObservationDensity {
  public:
   TapeDensity(Tape log_likelihood, std::string name, std::shared_ptr<const InputFunctions> inputs)
@@ -212,14 +291,31 @@ double log_noise(const NoiseLaw& law, double v) {
   return 0.5 * (v - std::exp(v)) - 0.5 * std::log(2.0 * std::numbers::pi);
 }
 
-std::unique_ptr<ObservationDensity> make_additive_noise(std::shared_ptr<const VectorFields> fields,
-                                                        std::vector<NoiseLaw> laws) {
-  if (laws.size() != fields->sensor_dimension())
+namespace {
+
+void check_laws(const VectorFields& fields, const std::vector<NoiseLaw>& laws) {
+  if (laws.size() != fields.sensor_dimension())
     throw InputError(
-        fmt::format("one law of the noise for each of {} components of h", fields->sensor_dimension()),
+        fmt::format("one law of the noise for each of {} components of h", fields.sensor_dimension()),
         "observation noise", std::to_string(laws.size()));
   for (const NoiseLaw& law : laws) check_law(law);
+}
+
+}  // namespace
+
+std::unique_ptr<ObservationDensity> make_additive_noise(std::shared_ptr<const VectorFields> fields,
+                                                        std::vector<NoiseLaw> laws) {
+  check_laws(*fields, laws);
   return std::make_unique<AdditiveNoise>(std::move(fields), std::move(laws));
+}
+
+std::unique_ptr<ObservationDensity> make_scaled_noise(std::shared_ptr<const VectorFields> fields,
+                                                      std::vector<NoiseLaw> laws, Tape scales,
+                                                      std::string name,
+                                                      std::shared_ptr<const InputFunctions> inputs) {
+  check_laws(*fields, laws);
+  return std::make_unique<ScaledNoise>(std::move(fields), std::move(laws), std::move(scales), std::move(name),
+                                       std::move(inputs));
 }
 
 std::unique_ptr<ObservationDensity> make_tape_density(Tape log_likelihood, std::string name,

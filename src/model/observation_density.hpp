@@ -30,6 +30,15 @@ double log_noise(const NoiseLaw& law, double v);
 std::unique_ptr<ObservationDensity> make_additive_noise(std::shared_ptr<const VectorFields> fields,
                                                         std::vector<NoiseLaw> laws);
 
+/// The same with scales that differ from state to state: v_i = s_i(x) w_i, w_i of law i with the scale 1.
+/// scales: a tape of k outputs s_i; inputs the d states and, for functions of time that are not null, their columns. Where
+/// s_i is not positive the density is NaN. There is no law of the noise alone.
+/// @throws InputError as make_additive_noise
+std::unique_ptr<ObservationDensity> make_scaled_noise(std::shared_ptr<const VectorFields> fields,
+                                                      std::vector<NoiseLaw> laws, Tape scales,
+                                                      std::string name,
+                                                      std::shared_ptr<const InputFunctions> inputs = nullptr);
+
 /// Log density by a tape: inputs the d states and, for functions of time that are not null, their columns at the last
 /// state, which is the clock; uniforms y_1 .. y_k, one output. It cannot be sampled from, nor split when only some
 /// components are missing. name: how errors call it, e.g. "model.toml, observation.log_likelihood"

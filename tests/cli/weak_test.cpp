@@ -330,6 +330,14 @@ TEST_CASE("inputs that are missing or wrong are told by place and value, with ex
   CHECK(columns == place.run("filter m.toml --observations both.csv --inputs same.csv --quiet").out);
   CHECK_THAT(place.run("compare m.toml nile --observations y.csv --inputs same.csv --quiet").out,
              Catch::Contains("log_evidence_2"));
+  // What was used is told, and a run is taken up with the same inputs only.
+  const std::string filter = "filter m.toml --observations y.csv --format json --quiet --inputs ";
+  CHECK(nlohmann::json::parse(place.run(filter + "same.csv").out)["options"]["inputs"] == "same.csv");
+  CHECK(place.run(filter + "same.csv --checkpoint c").code == 0);
+  CHECK(place.run(filter + "same.csv --resume c").code == 0);
+  const Outcome other = place.run(filter + "u.csv --resume c");
+  CHECK(other.code == 2);
+  CHECK_THAT(other.err, Catch::Contains("inputs"));
 }
 
 TEST_CASE("weak: several horizons and payoffs from one tree") {

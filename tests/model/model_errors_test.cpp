@@ -109,6 +109,10 @@ TEST_CASE("wrong shapes") {
 }
 
 TEST_CASE("values out of range") {
+  require_error({"scale = 1.0", "scale = \"x - 0.5\"", "m.toml:18:48, observation.noise.scale",
+                 "must be positive, and is not at the start", "0"});
+  require_error(
+      {"dof = 5", "dof = \"x\"", "m.toml:18:37, observation.noise.dof", "a state cannot be used here", "x"});
   require_error({"kappa = 1.5", "kappa = nan", "m.toml:4:9, parameters.kappa", "finite", "nan"});
   require_error({"kappa = 1.5", "kappa = -inf", "m.toml:4:9, parameters.kappa", "finite", "-inf"});
   require_error({"kappa = 1.5", "kappa = true", "m.toml:4:9, parameters.kappa",

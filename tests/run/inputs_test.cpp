@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <numbers>
 #include <string>
 
@@ -74,7 +75,9 @@ double log_normal(double x, double mean, double variance) {
 }
 
 // x_b = e x_a + (1 - e) u(a) + u' (D - (1 - e)) + noise of variance s^2 (1 - e^2)/2, e = exp(-D), D = b - a.
-double kalman_log_evidence(Between between, const ObservationPath& y) {
+double kalman_log_evidence(
+    Between between, const ObservationPath& y,
+    const std::function<double(double)>& variance = [](double) { return noise_sd * noise_sd; }) {
   double m = start, P = 0, sum = 0, t = 0;
   for (std::size_t r = 0; r < y.rows(); ++r) {
     for (const Piece& piece : pieces(between, t, y.times[r])) {
@@ -83,7 +86,7 @@ double kalman_log_evidence(Between between, const ObservationPath& y) {
       P = e * e * P + s * s * (1 - e * e) / 2;
       t = piece.end;
     }
-    const double S = P + noise_sd * noise_sd, predicted = m + value_at(between, t) / 2;
+    const double S = P + variance(value_at(between, t)), predicted = m + value_at(between, t) / 2;
     sum += log_normal(y.row(r)[0], predicted, S);
     m += P / S * (y.row(r)[0] - predicted);
     P -= P * P / S;
@@ -143,6 +146,41 @@ TEST_CASE("discrete observations of a driven Ornstein-Uhlenbeck process: Kalman'
     GivenOptions children = by(FilterMethod::klv);
     children.conditioning = Conditioning::children;
     CHECK(evidence(model, children, y, 5e-3) == Approx(exact).margin(5e-3));
+  }
+}
+
+TEST_CASE("the standard deviation of the noise may be a function of an input, or of the state") {
+  const ObservationPath y = rows(13, 0.5);
+  for (const Between between : {Between::linear, Between::previous}) {
+    INFO(name(between));
+    const std::string law = "noise = { law = \"gaussian\", sd = \"0.3 + 0.1*u^2\" }";
+    const Model model = driven(name(between), "kind = \"discrete\"\nh = [\"x + u/2\"]\n" + law)
+                            .with_inputs({given}, "u.csv")
+                            .model();
+    const double exact =
+        kalman_log_evidence(between, y, [](double u) { return std::pow(0.3 + 0.1 * u * u, 2); });
+    CHECK(evidence(model, {}, y, 1e-3) == Approx(exact).margin(1e-3));
+    // Of the state: the same as the density written out.
+    const Model by_law =
+        driven(name(between),
+               "kind = \"discrete\"\nh = [\"x\"]\nnoise = { law = \"laplace\", scale = \"exp(x/4)\" }")
+            .with_inputs({given}, "u.csv")
+            .model();
+    const Model by_density =
+        driven(name(between),
+               "kind = \"discrete\"\nlog_likelihood = \"-abs(y1 - x)/exp(x/4) - log(2) - x/4\"")
+            .with_inputs({given}, "u.csv")
+            .model();
+    for (const FilterMethod method :
+         {FilterMethod::klv, FilterMethod::euler, FilterMethod::gaussian_mixture}) {
+      GivenOptions options = by(method);
+      options.nodes = 60;
+      CHECK(evidence(by_law, options, y, 0.02) ==
+            Approx(evidence(by_density, options, y, 0.02)).epsilon(1e-9));
+    }
+    CHECK(by_law.density->gaussian_variances().empty());
+    CHECK_THROWS_AS(by_law.density->log_noise_density(std::vector{1.0}), InputError);
+    CHECK(std::isfinite(simulate(by_law, 6, 60, 12, 1).observations.values.back()));
   }
 }
 

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <Eigen/Eigenvalues>
+#include <algorithm>
 #include <cmath>
 
 #include "wienertree/model/observation_density.hpp"
@@ -148,19 +149,51 @@ class Assembly {
                                          observation.log_likelihood->location.text(), model_.inputs);
       return;
     }
+    const bool varies = std::any_of(bound_.noise_scale.begin(), bound_.noise_scale.end(),
+                                    [](Expression s) { return !s->is_number(); });
     std::vector<NoiseLaw> laws;
     for (std::size_t i = 0; i < bound_.sensor.size(); ++i)
-      laws.push_back(law_of(observation.noise[observation.noise.size() == 1 ? 0 : i]));
-    model_.density = make_additive_noise(model_.fields, std::move(laws));
+      laws.push_back(law_of(observation.noise_of(i), varies));
+    model_.density = varies ? make_scaled_noise(model_.fields, std::move(laws), noise_scales(),
+                                                observation.noise[0].location.text(), model_.inputs)
+                            : make_additive_noise(model_.fields, std::move(laws));
   }
 
-  NoiseLaw law_of(const NoiseSource& noise) const {
+  // The scales of the noise as functions of the states; at the start they must be positive.
+  Tape noise_scales() const {
+    const std::size_t columns = model_.inputs ? model_.inputs->columns() : 0;
+    TapeBuilder builder(bound_.d + columns, 0);
+    const BoundedStates states(model_.bounds, builder, model_.inputs.get(), bound_.d);
+    std::vector<TapeBuilder::Value> outputs;
+    for (Expression scale : bound_.noise_scale) outputs.push_back(emit(scale, states.symbols(), builder));
+    Tape tape = builder.finish(outputs);
+    if (model_.inputs && !model_.inputs->known()) return tape;
+    std::vector<const double*> at;
+    std::vector<double> scale(outputs.size());
+    std::vector<double*> to;
+    for (const double& x : model_.initial) at.push_back(&x);
+    if (model_.inputs) model_.inputs->append({&model_.initial.back(), 1}, at);
+    for (double& s : scale) to.push_back(&s);
+    tape.evaluate(at, {}, to, 1);
+    for (std::size_t i = 0; i < scale.size(); ++i)
+      if (!(scale[i] > 0) || !std::isfinite(scale[i])) {
+        const SourceExpression* place = source_.observation.noise_of(i).scale();
+        throw InputError("must be positive, and is not at the start",
+                         (place != nullptr ? *place : source_.observation.h[i]).location.text(),
+                         std::isnan(scale[i]) ? "nan" : fmt::format("{}", scale[i]));
+      }
+    return tape;
+  }
+
+  // Without the scale where that is a function of the state.
+  NoiseLaw law_of(const NoiseSource& noise, bool without_scale) const {
     constexpr std::array kinds{NoiseLaw::Kind::gaussian, NoiseLaw::Kind::laplace, NoiseLaw::Kind::student_t,
                                NoiseLaw::Kind::log_chi_square};
     NoiseLaw law;
     for (std::size_t i = 0; i < noise_laws.size(); ++i)
       if (noise_laws[i].law == noise.law) law.kind = kinds[i];
     for (const NamedExpression& parameter : noise.parameters) {
+      if (without_scale && parameter.name != "dof") continue;
       const double x = value(parameter.value);
       if (!(x > 0))
         throw InputError("must be positive", parameter.value.location.text(), fmt::format("{}", x));

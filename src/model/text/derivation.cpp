@@ -71,6 +71,11 @@ class Derivation {
       for (std::size_t j = 0; j < p_; ++j) diffusion_[j][i] = parse(source_.diffusion[i][j], scope_);
     if (!source_.correlation.empty()) make_independent();
     for (const SourceExpression& h : source_.observation.h) sensor_.push_back(parse(h, scope_));
+    if (!source_.observation.noise.empty())
+      for (std::size_t i = 0; i < sensor_.size(); ++i) {
+        const SourceExpression* scale = source_.observation.noise_of(i).scale();
+        noise_scale_.push_back(scale != nullptr ? parse(*scale, scope_) : ex(1));
+      }
     if (source_.observation.log_likelihood) {
       Scope with_observations = scope_;
       with_observations.observations = true;
@@ -141,6 +146,7 @@ class Derivation {
     for (const exvector& V : diffusion_)
       for (const ex& e : V) used = used || e.has(t);
     for (const ex& e : sensor_) used = used || e.has(t);
+    for (const ex& e : noise_scale_) used = used || e.has(t);
     result_.coefficients.has_clock = used;
     if (!used) return;
     given_drift_.push_back(1);
@@ -225,6 +231,11 @@ class Derivation {
         c.sensor_derivative.push_back(converted(at_place(place, [&] { return simpler(along); }), place));
       }
     }
+    for (std::size_t i = 0; i < noise_scale_.size(); ++i) {
+      const SourceExpression* scale = source_.observation.noise_of(i).scale();
+      c.noise_scale.push_back(
+          converted(noise_scale_[i], scale != nullptr ? *scale : source_.observation.h[i]));
+    }
     if (!source_.observation.log_likelihood) return;
     const SourceExpression& place = *source_.observation.log_likelihood;
     c.log_likelihood = converted(log_likelihood_, place);
@@ -280,7 +291,7 @@ class Derivation {
   Scope scope_;
   SymbolicBudget budget_;
   std::size_t d_ = 0, p_ = 0;
-  exvector given_drift_, ito_drift_, sensor_;
+  exvector given_drift_, ito_drift_, sensor_, noise_scale_;
   std::vector<exvector> diffusion_, V_;  // V_j of the source; V_0 .. V_p in Stratonovich form
   ex log_likelihood_;
   SymbolicModel result_{std::make_shared<Arena>(), {}, {}};

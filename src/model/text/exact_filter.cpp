@@ -65,6 +65,9 @@ Difference not_kalman_bucy(const ExactFilterQuestion& question) {
 
 Difference not_kalman(const ExactFilterQuestion& question) {
   if (question.model.observation != ObservationKind::discrete) return "the observation is not discrete";
+  for (Expression scale : question.bound.noise_scale)
+    if (!scale->is_number())
+      return fmt::format("the scale of observation.noise is not constant: {}", print(scale));
   if (question.model.density->gaussian_variances().empty()) return "observation.noise is not gaussian";
   return not_linear_gaussian(question);
 }

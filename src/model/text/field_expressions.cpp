@@ -43,6 +43,10 @@ FieldExpressions substitute(const FieldExpressions& coefficients, const ModelSou
   substitute_all(result.sensor_gradient, [&](std::size_t i) -> const SourceExpression& { return h[i / d]; });
   substitute_all(result.sensor_derivative,
                  [&](std::size_t i) -> const SourceExpression& { return h[i / coefficients.p]; });
+  substitute_all(result.noise_scale, [&](std::size_t i) -> const SourceExpression& {
+    const SourceExpression* scale = source.observation.noise_of(i).scale();
+    return scale != nullptr ? *scale : h[i];
+  });
   if (result.log_likelihood)
     result.log_likelihood = substitute(*result.log_likelihood, parameters, arena,
                                        source.observation.log_likelihood->location.text());

@@ -23,6 +23,8 @@ struct FieldExpressions {
   std::vector<Expression> sensor_gradient;         ///< entry i*d + l is dh_i/dx_l
   std::vector<Expression> sensor_derivative;       ///< entry i*p + r-1 is V_r h_i
   std::optional<Expression> log_likelihood;
+  std::vector<Expression>
+      noise_scale;  ///< sd or scale of the noise of each h, 1 where its law has none; k or empty
   std::vector<std::vector<Expression>> correlation;  ///< of the Brownian motions as given; empty: independent
   std::size_t observation_components = 0;            ///< y1 .. yk in `log_likelihood`
 

@@ -50,8 +50,8 @@ inline constexpr std::array<FileKey, 5> observation_keys{{
 
 inline constexpr std::array<FileKey, 4> noise_keys{{
     {"law", "\"gaussian\", \"laplace\", \"student-t\" or \"log-chi-square\"", "required", "the family"},
-    {"sd", "expression", "required for gaussian", "standard deviation"},
-    {"scale", "expression", "required for laplace and student-t", "scale"},
+    {"sd", "expression", "required for gaussian", "standard deviation, of states, inputs and t too"},
+    {"scale", "expression", "required for laplace and student-t", "scale, of states, inputs and t too"},
     {"dof", "expression", "required for student-t", "degrees of freedom"},
 }};
 

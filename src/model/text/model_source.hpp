@@ -36,6 +36,12 @@ struct NoiseSource {
   std::string law;
   Location location;
   std::vector<NamedExpression> parameters;  ///< in the order of `noise_laws`
+  /// The parameter that multiplies: sd or scale. Null: the law has none.
+  const SourceExpression* scale() const {
+    for (const NamedExpression& parameter : parameters)
+      if (parameter.name == "sd" || parameter.name == "scale") return &parameter.value;
+    return nullptr;
+  }
 };
 
 /// The laws of the language and the parameters each needs.
@@ -54,6 +60,7 @@ struct ObservationSource {
   Location location;
   std::vector<SourceExpression> h;
   std::vector<NoiseSource> noise;  ///< one for all components, or one per component
+  const NoiseSource& noise_of(std::size_t i) const { return noise[noise.size() == 1 ? 0 : i]; }
   std::optional<SourceExpression> log_likelihood;
 };
 
