@@ -207,7 +207,7 @@ void use_exact_transition(const WeakArguments& a, WeakProblem& problem) {
     std::vector<BatchFunction>& times = problem.by_time.emplace_back();
     for (const double T : a.horizons)
       times.push_back(problem.discount_state ? price.average(f.exact, f.kinks, T)
-                                             : price.average_of_rest(f.exact, f.kinks, T));
+                                             : price.average_of_rest(f, T));
     KinkedFunction smooth;
     smooth.exact = times.back();
     problem.kinked[i] = std::move(smooth);
@@ -381,6 +381,8 @@ WeakRun weak_run(const WeakArguments& a, const WeakProblem& problem, CubatureFor
   run.grid = a.grid.value_or(GridKind::uniform);
   run.horizon = a.horizon();
   if (a.horizons.size() > 1) run.horizons = a.horizons;
+  run.kinks_at_times = a.horizons.size() > 1 &&
+                       std::ranges::any_of(problem.kinked, [](const auto& f) { return !f.kinks.empty(); });
   run.jumps = jumps_inside(model, run.horizon);
   run.steps = a.steps.value_or(0);
   run.gamma = a.gamma.value_or(o.formula.degree);

@@ -6,6 +6,9 @@
 #include <utility>
 #include <vector>
 
+#include "wienertree/weak/affine_pieces.hpp"
+#include "wienertree/weak/given_variances.hpp"
+
 namespace wienertree {
 
 namespace {
@@ -29,18 +32,7 @@ class Average {
  public:
   Average(const SquareRootStructure& structure, const std::vector<double>& start, const BatchFunction& f,
           const std::vector<BatchFunction>& kinks, double T)
-      : structure_(structure), f_(f), kinks_(kinks), d_(start.size()) {
-    const SquareRootStructure::Price& price = *structure.price;
-    const double u = start[price.state];
-    mean_ = (price.logarithmic ? u : std::log(u)) + price.rate * T;
-    for (std::size_t k = 0; k < structure.components.size(); ++k) {
-      const auto& [state, process, shift] = structure.components[k];
-      const double slope = price.correlated[k] / std::sqrt(process.c);
-      mean_ -= slope * (start[state] + shift + process.a * T);
-      of_component_.push_back(slope);
-      of_integral_.push_back(price.drift[k] - slope * process.b);
-    }
-  }
+      : structure_(structure), f_(f), kinks_(kinks), d_(start.size()), law_of_(structure, start, T) {}
 
   void operator()(ConstBatchView leaves, std::span<double> out) {
     for (std::size_t first = 0; first < leaves.nodes(); first += leaves_at_once)
@@ -55,20 +47,9 @@ class Average {
   };
 
   void some(ConstBatchView leaves, std::span<double> out) {
-    const SquareRootStructure::Price& price = *structure_.price;
-    const std::size_t N = leaves.nodes(), K = of_component_.size();
+    const std::size_t N = leaves.nodes();
     law_.resize(N);
-    for (std::size_t n = 0; n < N; ++n) {
-      double m = mean_, variance = 0;
-      for (std::size_t k = 0; k < K; ++k) {
-        const std::size_t state = structure_.components[k].state;
-        const double v = leaves(state < price.state ? state : state - 1, n) + structure_.components[k].shift;
-        const double I = leaves(d_ - 1 + k, n);
-        m += of_component_[k] * v + of_integral_[k] * I;
-        variance += price.independent[k] * I;
-      }
-      law_[n] = {m, std::sqrt(std::max(0.0, variance))};
-    }
+    for (std::size_t n = 0; n < N; ++n) law_[n] = law_of_(leaves, n);
     find_breaks(leaves);
     points_.clear();
     for (std::size_t n = 0; n < N; ++n) add_panels(n);
@@ -177,16 +158,12 @@ class Average {
     }
   }
 
-  struct Law {
-    double mean, deviation;
-  };
   const SquareRootStructure& structure_;
   const BatchFunction& f_;
   const std::vector<BatchFunction>& kinks_;
   std::size_t d_;
-  double mean_ = 0;
-  std::vector<double> of_component_, of_integral_;
-  std::vector<Law> law_;
+  GivenVariances law_of_;
+  std::vector<NormalLaw> law_;
   std::vector<std::vector<double>> breaks_;
   std::vector<Point> points_;
   std::vector<double> values_;
@@ -237,6 +214,22 @@ BatchFunction ConditionalPrice::average_of_rest(const BatchFunction& f,
                                                                            std::span<double> out) {
     averaged(x, out);
     for (double& value : out) value += mean;
+  };
+}
+
+BatchFunction ConditionalPrice::average_of_rest(const KinkedFunction& f, double T) const {
+  const SquareRootStructure::Price& price = *structure_.price;
+  std::optional<AffinePieces> pieces = affine_pieces(f, start_, price.state, price.logarithmic);
+  if (!pieces) return average_of_rest(f.exact, f.kinks, T);
+  const std::optional<double> expected = forward(T);
+  const double known = expected ? pieces->pieces.back().slope : 0;
+  for (AffinePieces::Piece& piece : pieces->pieces) piece.slope -= known;
+  return [pieces = *std::move(pieces), law_of = GivenVariances(structure_, start_, T),
+          constant = known * expected.value_or(0)](ConstBatchView x, std::span<double> out) {
+    for (std::size_t n = 0; n < out.size(); ++n) {
+      const NormalLaw law = law_of(x, n);
+      out[n] = constant + pieces.average(law.mean, law.deviation);
+    }
   };
 }
 

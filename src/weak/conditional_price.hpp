@@ -36,6 +36,9 @@ class ConditionalPrice {
   /// to 1.
   BatchFunction average_of_rest(const BatchFunction& f, const std::vector<BatchFunction>& kinks,
                                 double T) const;
+  /// The same. Where f is affine in the price between its kinks and jumps, and depends on nothing else, as calls, puts,
+  /// digitals and their spreads do, in closed form (affine_pieces.hpp), at a hundredth of the work.
+  BatchFunction average_of_rest(const KinkedFunction& f, double T) const;
 
   /// Where a state of the whole model other than the price is among the tree's.
   std::size_t place(std::size_t state) const { return state < structure_.price->state ? state : state - 1; }

@@ -129,24 +129,37 @@ class Control {
 
   // A step of half of 1/rate. In several dimensions trees of many steps are dear: guards must do from 32 on.
   std::size_t fewest_steps() {
-    const double wanted = 2 * fastest_rate(model_, run_.horizon) * run_.horizon;
-    const double most = model_.reported_dimension() > 1 ? 32 : 512;
+    const double rate = fastest_rate(model_, run_.horizon);
+    const std::size_t most = model_.reported_dimension() > 1 ? 32 : 512;
     // Below a level of 8 steps, intervals between times do not all double with the level.
     const std::size_t least = times_ > 1 ? 8 : 4;
     std::size_t n = least;
-    while (static_cast<double>(steps_of_level(run_, n)) < wanted && static_cast<double>(n) < most) n *= 2;
+    while (longest_step(n) * 2 * rate > 1 && n < most) n *= 2;
     if (n > least)
       best_.notes.push_back(
           fmt::format("at least {} steps, for the fastest rate of the model is {:.3g} per unit of time",
-                      steps_of_level(run_, n), wanted / (2 * run_.horizon)));
+                      steps_of_level(run_, n), rate));
     return n;
+  }
+
+  // Of equal steps, where they shrink towards the horizon.
+  double longest_step(std::size_t n) const {
+    WeakOptions options;
+    WeakRun run = run_;
+    if (run.horizons.size() < 2) run.grid = GridKind::uniform;
+    set_grid(run, interval_steps(run, n), options);
+    double longest = 0;
+    for (std::size_t i = 1; i < options.grid.size(); ++i)
+      longest = std::max(longest, options.grid[i] - options.grid[i - 1]);
+    return longest * (1 - 1e-12);
   }
 
   // Trees of 2 steps are grown whole where they are small, so that no thinning blurs what they show.
   WeakLevels levels_of_two_steps(WeakRun run) const {
     const std::size_t roots = first_generation(model_, run.options.nodes).size();
-    if (unpruned_size(run.options.formula, model_, steps_of_level(run, 2), roots).leaves <= 1e5)
+    if (unpruned_size(run.options.formula, model_, 2, roots).leaves <= 1e5)
       run.options.thinning.method = ThinningMethod::none;
+    run.horizons.clear();
     return {model_, payoffs_, std::move(run)};
   }
 
@@ -160,7 +173,38 @@ class Control {
     const double error = largest_difference(trees.value(2), trees.value(1)) / (std::exp2(q) - 1);
     pilot_solves_ += trees.ode_solves();
     const double n = 2 * std::max(1.0, std::pow(error / target_.tolerance, 1 / (q + 1)));
-    return n * static_cast<double>(total_segments(formula));
+    return n * (static_cast<double>(total_segments(formula)) + segments_of_guard(formula));
+  }
+
+  // With several times every guard is a tree with all of their reports: its work decides as well.
+  double segments_of_guard(const CubatureFormula& formula) const {
+    if (times_ == 1) return 0;
+    const auto [higher, lower] = guards_of(formula.degree);
+    if (lower_is_cheaper(higher, lower) || higher == nullptr)
+      return lower == nullptr ? 0 : 2 * static_cast<double>(total_segments(*lower));
+    return static_cast<double>(total_segments(*higher));
+  }
+  static bool lower_is_cheaper(const CubatureFormula* higher, const CubatureFormula* lower) {
+    return higher && lower && lower->degree >= 5 && 2 * total_segments(*lower) < total_segments(*higher);
+  }
+  // Families of the last two steps before each of several times cost more than a higher degree.
+  bool families_too_dear(const CubatureFormula& formula) const {
+    if (times_ == 1 || formula.degree > 5) return false;
+    for (const WeakPayoff& payoff : payoffs_)
+      if (!payoff.function.kinks.empty()) return true;
+    return false;
+  }
+
+  struct Guards {
+    const CubatureFormula *higher = nullptr, *lower = nullptr;
+  };
+  Guards guards_of(int degree) const {
+    Guards found;
+    for (const CubatureFormula& guard : target_.guards) {
+      if (guard.degree < degree) found.lower = &guard;
+      if (guard.degree > degree && found.higher == nullptr) found.higher = &guard;
+    }
+    return found;
   }
 
   void choose_formula() {
@@ -171,6 +215,7 @@ class Control {
       // One step may not cost more than the whole of what is known to do.
       if (best != nullptr && 2 * static_cast<double>(total_segments(formula)) >= least) continue;
       if (target_.formulas.size() == 1) break;
+      if (families_too_dear(formula) && target_.formulas.back().degree > formula.degree) continue;
       try {
         const double work = promised_work(formula);
         if (work >= least) continue;
@@ -187,7 +232,7 @@ class Control {
   // many for a formula that was chosen for its order, leave a tenth of the tolerance.
   void measure_ode_error(int attempts) {
     ode_.assign(payoffs_.size() * times_, 0.0);
-    if (run_.options.flow == FlowMethod::exact) return;
+    if (run_.options.flow == FlowMethod::exact || run_.options.transition) return;
     const double steps = static_cast<double>(std::max<std::size_t>(16, run_.steps));
     for (int attempt = 0;; ++attempt) {
       WeakRun finer = run_;
@@ -204,8 +249,10 @@ class Control {
         }
       const std::vector<double> value = now.value(n), better = then.value(n);
       pilot_solves_ += now.ode_solves() + then.ode_solves();
+      // That at earlier times is no larger.
       for (std::size_t i = 0; i < ode_.size(); ++i)
-        ode_[i] = std::abs(value[i] - better[i]) * 2 / static_cast<double>(n);
+        ode_[i] =
+            std::abs(value[i % payoffs_.size()] - better[i % payoffs_.size()]) * 2 / static_cast<double>(n);
       if (largest_difference(value, better) * steps / static_cast<double>(n) <= target_.tolerance / 10 ||
           attempt >= attempts)
         return;
@@ -222,6 +269,7 @@ class Control {
       found = levels_.emplace(std::pair{nodes, width}, WeakLevels(model_, payoffs_, run)).first;
     }
     found->second.set_launches(run_.launches);
+    found->second.set_base(run_.steps);
     return found->second;
   }
   WeakLevels& trees_now() { return at(run_.options.nodes, run_.options.patch_width); }
@@ -366,12 +414,9 @@ class Control {
 
   void compare_degrees() {
     if (target_.guards.empty()) return;
-    const int degree = run_.options.formula.degree;
-    const CubatureFormula *higher = nullptr, *lower = nullptr;
-    for (const CubatureFormula& guard : target_.guards) {
-      if (guard.degree < degree) lower = &guard;
-      if (guard.degree > degree && higher == nullptr) higher = &guard;
-    }
+    const auto [higher, lower] = guards_of(run_.options.formula.degree);
+    std::vector<std::pair<const CubatureFormula*, std::size_t>> order = {{higher, 1}, {lower, 2}};
+    if (times_ > 1 && lower_is_cheaper(higher, lower)) std::swap(order[0], order[1]);
     // Trees of n and n/2 steps.
     const double once = static_cast<double>(trees_now().ode_solves(run_.steps)) /
                         static_cast<double>(total_segments(run_.options.formula));
@@ -382,13 +427,13 @@ class Control {
     };
     std::vector<double> Y, deviation;
     std::string obstacle = fmt::format("it would take over {:.2g} ODE solves", target_.most_solves);
-    for (const auto& [guard, multiple] :
-         {std::pair{higher, std::size_t{1}}, std::pair{lower, std::size_t{2}}}) {
+    for (const auto& [guard, multiple] : order) {
       if (!Y.empty() || !affordable(guard, static_cast<double>(multiple))) continue;
       WeakRun run = run_;
       run.options.formula = *guard;
       WeakLevels levels(model_, payoffs_, run);
       levels.set_launches(run_.launches);
+      levels.set_base(run_.steps);
       try {
         Y = levels.extrapolated(multiple * run_.steps);
         deviation = levels.standard_error(multiple * run_.steps);
@@ -417,6 +462,7 @@ class Control {
     const int usual = thinning.recombination_degree > 0 ? thinning.recombination_degree : d == 2 ? 5 : 3;
     run.options.thinning.recombination_degree = usual > 3 ? 3 : 2;
     WeakLevels levels(model_, payoffs_, run);
+    levels.set_base(run_.steps);
     const std::vector<double> Y = levels.value(run_.steps), V = trees_now().value(run_.steps);
     pilot_solves_ += levels.ode_solves();
     double most = 0;

@@ -112,6 +112,8 @@ LeafAverage FamilyAverage::operator()(const KinkedFunction& payoff) {
     argument_[k].resize(leaves_.size());
     payoff.kinks[k](leaves_.states, argument_[k]);
   }
+  member_.assign(payoff.kinks.size(), {});
+  for (std::size_t k = 0; k < payoff.kinks.size(); ++k) classify(k);
   law_.resize(payoff.kinks.size());
   crosses_.resize(payoff.kinks.size());
   branch_.clear();
@@ -130,6 +132,39 @@ LeafAverage FamilyAverage::operator()(const KinkedFunction& payoff) {
     terms[family] = sum;
   }
   return sum_of(terms);
+}
+
+// Looks for an argument before it that differs by a constant alone; else it is the first of a class, of a few.
+void FamilyAverage::classify(std::size_t k) {
+  const std::vector<double>& u = argument_[k];
+  for (ArgumentClass& known : classes_) {
+    const double shift = u[0] - known.values[0];
+    bool same = std::isfinite(shift);
+    for (std::size_t n = 0; same && n < u.size(); ++n) {
+      // Rounding of the arguments and of the difference, a few units of 2^-53.
+      const double size = std::abs(u[n]) + std::abs(known.values[n]) + std::abs(shift);
+      same = std::abs(u[n] - known.values[n] - shift) <= 1e-15 * size;
+    }
+    if (!same) continue;
+    member_[k] = {&known, shift};
+    return;
+  }
+  constexpr std::size_t most_classes = 8;
+  if (classes_.size() == most_classes) return;
+  classes_.push_back({u, std::vector<FamilyShape>(families_)});
+  member_[k] = {&classes_.back(), 0};
+}
+
+FamilyAverage::FamilyShape& FamilyAverage::shape_of(ArgumentClass& of) {
+  FamilyShape& shape = of.families[family_];
+  if (shape.known) return shape;
+  for (std::size_t j = 0; j < members_; ++j) values_[j] = of.values[j * families_ + family_];
+  const auto [least, most] = std::minmax_element(values_.begin(), values_.end());
+  shape.least = *least;
+  shape.most = *most;
+  if (std::isfinite(*most - *least)) shape.law = step_law(values_, w_, four_);
+  shape.known = true;
+  return shape;
 }
 
 void FamilyAverage::take_family(std::size_t family) {
@@ -157,14 +192,29 @@ bool FamilyAverage::cross_somewhere(const KinkedFunction& payoff) {
     const bool smooth = payoff.with_argument || crossing_ == 0;
     for (const Sides inside : {Sides{0}, crossing_}) {
       if (crosses_[k] != 0 || (smooth && inside != 0)) continue;
-      take_argument(payoff, k, fixed_ | inside);
-      const auto [least, most] = std::minmax_element(values_.begin(), values_.end());
-      if (!std::isfinite(*most - *least)) return false;  // the average tells
-      const double nearest = *least > 0 ? *least : *most < 0 ? -*most : 0;
-      const bool far = nearest > 30 * (*most - *least);  // no law of this spread comes near
-      double centre = *least;
+      double low = 0, high = 0;
+      const bool shared = smooth && member_[k].of != nullptr;
+      if (shared) {
+        const FamilyShape& shape = shape_of(*member_[k].of);
+        low = shape.least + member_[k].shift;
+        high = shape.most + member_[k].shift;
+      } else {
+        take_argument(payoff, k, fixed_ | inside);
+        const auto [least, most] = std::minmax_element(values_.begin(), values_.end());
+        low = *least;
+        high = *most;
+      }
+      if (!std::isfinite(high - low)) return false;  // the average tells
+      const double nearest = low > 0 ? low : high < 0 ? -high : 0;
+      const bool far = nearest > 30 * (high - low);  // no law of this spread comes near
+      double centre = low;
       if (!far) {
-        law_[k] = step_law(values_, w_, four_);
+        if (shared) {
+          law_[k] = shape_of(*member_[k].of).law;
+          law_[k].mean += member_[k].shift;
+        } else {
+          law_[k] = step_law(values_, w_, four_);
+        }
         centre = law_[k].mean;
         const Crossings found = crossings(law_[k], 0, reach);
         if (found.count > 0) {
@@ -187,10 +237,11 @@ bool FamilyAverage::cross_somewhere(const KinkedFunction& payoff) {
   return crossing_ != 0;
 }
 
-void FamilyAverage::build_basis() {
+void FamilyAverage::build_basis(Basis& basis) const {
   const std::size_t variables = plane_ ? monomials.size() : 4;
-  basis_.clear();
-  combination_.clear();
+  auto& [functions, combination] = basis;
+  functions.clear();
+  combination.clear();
   for (std::size_t m = 0; m < variables; ++m) {
     std::vector<double> v(members_), c(monomials.size(), 0.0);
     c[m] = 1;
@@ -200,11 +251,11 @@ void FamilyAverage::build_basis() {
       size += w_[j] / mass_ * v[j] * v[j];
     }
     for (int pass = 0; pass < 2; ++pass)
-      for (std::size_t b = 0; b < basis_.size(); ++b) {
+      for (std::size_t b = 0; b < functions.size(); ++b) {
         double product = 0;
-        for (std::size_t j = 0; j < members_; ++j) product += w_[j] / mass_ * v[j] * basis_[b][j];
-        for (std::size_t j = 0; j < members_; ++j) v[j] -= product * basis_[b][j];
-        for (std::size_t i = 0; i < c.size(); ++i) c[i] -= product * combination_[b][i];
+        for (std::size_t j = 0; j < members_; ++j) product += w_[j] / mass_ * v[j] * functions[b][j];
+        for (std::size_t j = 0; j < members_; ++j) v[j] -= product * functions[b][j];
+        for (std::size_t i = 0; i < c.size(); ++i) c[i] -= product * combination[b][i];
       }
     double norm = 0;
     for (std::size_t j = 0; j < members_; ++j) norm += w_[j] / mass_ * v[j] * v[j];
@@ -212,18 +263,19 @@ void FamilyAverage::build_basis() {
     if (!(norm > 1e-6 * size) || size == 0) continue;
     for (double& value : v) value /= std::sqrt(norm);
     for (double& value : c) value /= std::sqrt(norm);
-    basis_.push_back(std::move(v));
-    combination_.push_back(std::move(c));
+    functions.push_back(std::move(v));
+    combination.push_back(std::move(c));
   }
 }
 
 // Coefficients of the monomials.
 void FamilyAverage::project(std::span<const double> values, std::span<double> coefficients) const {
   std::fill(coefficients.begin(), coefficients.end(), 0.0);
-  for (std::size_t b = 0; b < basis_.size(); ++b) {
+  for (std::size_t b = 0; b < basis_->functions.size(); ++b) {
     double product = 0;
-    for (std::size_t j = 0; j < members_; ++j) product += w_[j] / mass_ * values[j] * basis_[b][j];
-    for (std::size_t i = 0; i < coefficients.size(); ++i) coefficients[i] += product * combination_[b][i];
+    for (std::size_t j = 0; j < members_; ++j) product += w_[j] / mass_ * values[j] * basis_->functions[b][j];
+    for (std::size_t i = 0; i < coefficients.size(); ++i)
+      coefficients[i] += product * basis_->combination[b][i];
   }
 }
 
@@ -334,7 +386,11 @@ double FamilyAverage::with_kinks(const KinkedFunction& payoff) {
     eta_[j] = 0;
   }
   plane_ = false;
-  build_basis();
+  Basis* basis = &own_basis_;
+  const bool shared = member_[main_].of != nullptr;
+  if (shared) basis = &shape_of(*member_[main_].of).basis;
+  if (!shared || basis->functions.empty()) build_basis(*basis);
+  basis_ = basis;
   build_second(payoff);
   return plane_ ? plane_integral(payoff) : line_integral(payoff);
 }
@@ -366,7 +422,9 @@ void FamilyAverage::build_second(const KinkedFunction& payoff) {
     }
   }
   plane_ = plane;
-  if (plane_) build_basis();
+  if (!plane_) return;
+  build_basis(own_basis_);
+  basis_ = &own_basis_;
 }
 
 double FamilyAverage::line_integral(const KinkedFunction& payoff) {

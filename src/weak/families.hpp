@@ -15,6 +15,7 @@
 /// itself at u(z) takes its place. Kinks whose arguments differ by more than a function of u are integrated over
 /// the plane of z and of the normalised rest of the second argument.
 #include <cstdint>
+#include <deque>
 #include <map>
 #include <vector>
 
@@ -45,13 +46,37 @@ class FamilyAverage {
  private:
   using Sides = std::uint64_t;  ///< bit k: argument k is positive
 
+  /// Functions of the members of a family, orthonormal under its weights.
+  struct Basis {
+    std::vector<std::vector<double>> functions;    ///< at the members
+    std::vector<std::vector<double>> combination;  ///< each in the monomials
+  };
+  /// What an argument and all that differ from it by a constant share, as those of a strip of strikes do.
+  struct FamilyShape {
+    bool known = false;
+    double least = 0, most = 0;
+    StepLaw law;
+    Basis basis;  ///< in powers of (u - mean) / deviation; empty until it is needed
+  };
+  struct ArgumentClass {
+    std::vector<double> values;  ///< of the first argument, at the leaves
+    std::vector<FamilyShape> families;
+  };
+  /// The class of argument k of a payoff, and what it has on top of the first one's.
+  struct Membership {
+    ArgumentClass* of = nullptr;
+    double shift = 0;
+  };
+
+  void classify(std::size_t k);
+  FamilyShape& shape_of(ArgumentClass& of);
   void take_family(std::size_t family);
   void take_argument(const KinkedFunction& payoff, std::size_t k, Sides sides);
   bool cross_somewhere(const KinkedFunction& payoff);
   double with_kinks(const KinkedFunction& payoff);
   double line_integral(const KinkedFunction& payoff);
   double plane_integral(const KinkedFunction& payoff);
-  void build_basis();
+  void build_basis(Basis& basis) const;
   void build_second(const KinkedFunction& payoff);
   void project(std::span<const double> values, std::span<double> coefficients) const;
   double at(std::span<const double> coefficients, double xi, double eta) const;
@@ -69,9 +94,11 @@ class FamilyAverage {
   bool four_;
   std::vector<double> weight_;  ///< of the leaves
   std::size_t family_ = 0;
+  std::deque<ArgumentClass> classes_;
   // Of the payoff: values at all leaves.
   std::vector<double> exact_;
   std::vector<std::vector<double>> argument_;
+  std::vector<Membership> member_;
   std::map<Sides, std::vector<double>> branch_;
   std::map<Sides, bool> singular_;
   std::map<std::pair<std::size_t, Sides>, std::vector<double>> argument_branch_;
@@ -86,8 +113,8 @@ class FamilyAverage {
   Sides crossing_ = 0;  ///< kinks that do
   std::size_t main_ = 0;
   bool plane_ = false;
-  std::vector<std::vector<double>> basis_;        ///< orthonormal functions at the members
-  std::vector<std::vector<double>> combination_;  ///< each in the monomials
+  Basis own_basis_;
+  const Basis* basis_ = nullptr;
   std::map<Sides, std::vector<double>> branch_fit_;
   std::map<std::pair<std::size_t, Sides>, std::vector<double>> argument_fit_;
   Batch states_, further_;

@@ -14,11 +14,20 @@ WeakLevels::WeakLevels(const Model& model, const std::vector<WeakPayoff>& payoff
       run_(std::move(run)),
       start_(first_generation(model, run_.options.nodes)) {}
 
+std::vector<std::size_t> WeakLevels::counts_of(std::size_t n) const {
+  const std::size_t base = base_ > 0 ? base_ : n;
+  std::vector<std::size_t> counts = interval_steps(run_, base);
+  for (std::size_t m = base; m > n; m = (m + 1) / 2) counts = halved(std::move(counts));
+  for (std::size_t& count : counts) count *= std::max<std::size_t>(1, n / base);
+  return counts;
+}
+
 const std::vector<WeakEstimate>& WeakLevels::trees(std::size_t n) {
-  std::vector<WeakEstimate>& grown = trees_[n];
+  const std::vector<std::size_t> counts = counts_of(n);
+  std::vector<WeakEstimate>& grown = trees_[counts];
   if (grown.size() < launches_) {
     WeakOptions options = run_.options;
-    set_grid(run_, n, options);
+    set_grid(run_, counts, options);
     while (grown.size() < launches_) {
       options.launch = static_cast<std::uint32_t>(grown.size());
       grown.push_back(weak_approximation(model_, start_, payoffs_, options));

@@ -19,6 +19,10 @@ class WeakLevels {
   /// Averages are over the launches 0..M-1 from now on.   @pre M >= 1
   void set_launches(std::uint32_t M) { launches_ = M; }
 
+  /// Level `base` is that of interval_steps(); the others halve or double its steps in every interval, so that
+  /// extrapolation finds each of them halved. 0: each level is its own.
+  void set_base(std::size_t base) { base_ = base; }
+
   /// V_n, one a payoff.
   std::vector<double> value(std::size_t n);
   /// X_n, extrapolated from n/2 and n steps (run_weak); X_1 = V_1.   @pre n is a power of 2
@@ -36,6 +40,7 @@ class WeakLevels {
 
  private:
   const std::vector<WeakEstimate>& trees(std::size_t n);
+  std::vector<std::size_t> counts_of(std::size_t n) const;
   double extrapolated(std::size_t n, std::size_t payoff, std::size_t launch);
 
   const Model& model_;
@@ -44,7 +49,9 @@ class WeakLevels {
   Generation start_;
   std::uint32_t launches_ = 1;
   std::uint64_t solves_ = 0;
-  std::map<std::size_t, std::vector<WeakEstimate>> trees_;  ///< by steps, then launch
+  std::size_t base_ = 0;
+  /// By steps in each interval, then launch.
+  std::map<std::vector<std::size_t>, std::vector<WeakEstimate>> trees_;
 };
 
 }  // namespace wienertree

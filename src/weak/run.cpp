@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 #include <string>
 #include <utility>
 
@@ -60,17 +61,18 @@ std::vector<double> ends_of_intervals(const WeakRun& run) {
 std::vector<double> shares(const WeakRun& run, const std::vector<double>& ends) {
   std::vector<double> result;
   double before = 0;
-  for (const double t : ends)
-    result.push_back(std::exp2(
-        std::round(std::log2((t - std::exchange(before, t)) / (run.jumps.empty() ? t : ends.back())))));
+  for (const double t : ends) {
+    const double against = run.jumps.empty() ? std::sqrt(t * ends.back()) : ends.back();
+    result.push_back(std::exp2(std::round(std::log2((t - std::exchange(before, t)) / against))));
+  }
   return result;
 }
 
-std::size_t steps_of_share(std::size_t m, double share) {
-  return std::max<std::size_t>(1, static_cast<std::size_t>(static_cast<double>(m) * share));
-}
-
 bool is_one_interval(const WeakRun& run) { return run.horizons.size() < 2 && run.jumps.empty(); }
+
+// Extrapolation wants every interval to have twice the steps of the coarser tree.
+constexpr std::size_t multiple_to_extrapolate = 8;
+constexpr std::size_t least_to_first_time = 4;
 
 }  // namespace
 
@@ -81,27 +83,40 @@ std::vector<double> jumps_inside(const Model& model, double horizon) {
   return inside;
 }
 
+std::vector<std::size_t> interval_steps(const WeakRun& run, std::size_t m) {
+  if (is_one_interval(run)) return {m};
+  std::vector<std::size_t> counts;
+  for (const double share : shares(run, ends_of_intervals(run)))
+    counts.push_back(std::max<std::size_t>(1, static_cast<std::size_t>(static_cast<double>(m) * share)));
+  if (run.jumps.empty())
+    counts.front() = run.kinks_at_times ? m : std::max(counts.front(), std::min(m, least_to_first_time));
+  return counts;
+}
+
+std::vector<std::size_t> halved(std::vector<std::size_t> counts) {
+  for (std::size_t& count : counts) count = (count + 1) / 2;
+  return counts;
+}
+
 std::size_t steps_of_level(const WeakRun& run, std::size_t m) {
-  if (is_one_interval(run)) return m;
-  std::size_t sum = 0;
-  for (const double share : shares(run, ends_of_intervals(run))) sum += steps_of_share(m, share);
-  return sum;
+  const std::vector<std::size_t> counts = interval_steps(run, m);
+  return std::accumulate(counts.begin(), counts.end(), std::size_t{0});
 }
 
 std::size_t level_of(const WeakRun& run) {
   if (is_one_interval(run)) return run.steps;
-  double sum = 0;
-  for (const double share : shares(run, ends_of_intervals(run))) sum += share;
-  const double m = static_cast<double>(run.steps) / sum;
-  // Extrapolation wants every interval to have twice the steps of the coarser tree: down to f_k = 1/4.
-  const double multiple = run.richardson ? 8 : 1;
-  return static_cast<std::size_t>(std::max(1.0, std::round(m / multiple)) * multiple);
+  // Steps grow with the level: the first that has as many, or the one before it where that is nearer.
+  const std::size_t multiple = run.richardson ? multiple_to_extrapolate : 1;
+  std::size_t m = multiple;
+  while (steps_of_level(run, m) < run.steps) m += multiple;
+  const std::size_t before = m > multiple ? steps_of_level(run, m - multiple) : 0;
+  return before > 0 && run.steps - before < steps_of_level(run, m) - run.steps ? m - multiple : m;
 }
 
-void set_grid(const WeakRun& run, std::size_t m, WeakOptions& options) {
+void set_grid(const WeakRun& run, const std::vector<std::size_t>& counts, WeakOptions& options) {
   options.report_at.clear();
   if (is_one_interval(run)) {
-    options.grid = time_grid(run.grid, run.horizon, m, run.gamma);
+    options.grid = time_grid(run.grid, run.horizon, counts.front(), run.gamma);
     return;
   }
   for (std::size_t i = 0; i < run.horizons.size(); ++i)
@@ -112,10 +127,10 @@ void set_grid(const WeakRun& run, std::size_t m, WeakOptions& options) {
                                        : "has no room for the jumps of inputs",
                      "grid", "kusuoka");
   options.grid.assign(1, 0.0);
-  const std::vector<double> ends = ends_of_intervals(run), share = shares(run, ends);
-  for (std::size_t k = 0; k < share.size(); ++k) {
+  const std::vector<double> ends = ends_of_intervals(run);
+  for (std::size_t k = 0; k < ends.size(); ++k) {
     const double from = k == 0 ? 0 : ends[k - 1], length = ends[k] - from;
-    const std::size_t n = steps_of_share(m, share[k]);
+    const std::size_t n = counts[k];
     for (std::size_t i = 1; i < n; ++i)
       options.grid.push_back(from + length * static_cast<double>(i) / static_cast<double>(n));
     options.grid.push_back(ends[k]);
@@ -131,24 +146,25 @@ WeakResult run_weak(const Model& model, const std::vector<WeakPayoff>& payoffs, 
   const Generation start = first_generation(model, run.options.nodes);
   const std::size_t level = level_of(run), coarse_level = (level + 1) / 2;
   const std::size_t values = payoffs.size() * std::max<std::size_t>(1, run.horizons.size());
+  const std::vector<std::size_t> fine_counts = interval_steps(run, level);
   std::vector<Mean> value(values), extrapolated(run.richardson ? values : 0);
   WeakResult result;
   WeakOptions options = run.options;
-  const auto tree = [&](std::size_t steps) {
-    set_grid(run, steps, options);
+  const auto tree = [&](const std::vector<std::size_t>& counts) {
+    set_grid(run, counts, options);
     WeakEstimate estimate = weak_approximation(model, start, payoffs, options);
     result.ode_solves += estimate.ode_solves;
     return estimate;
   };
   for (std::uint32_t launch = 0; launch < run.launches; ++launch) {
     options.launch = run.first_launch + launch;
-    const WeakEstimate fine = tree(level);
+    const WeakEstimate fine = tree(fine_counts);
     result.leaves = fine.leaves;
     result.carriers = fine.carriers;
     result.discarded = fine.discarded;
     for (std::size_t i = 0; i < values; ++i) value[i].add(fine.value[i]);
     if (!run.richardson) continue;
-    const WeakEstimate coarse = tree(coarse_level);
+    const WeakEstimate coarse = tree(halved(fine_counts));
     for (std::size_t i = 0; i < values; ++i)
       extrapolated[i].add(
           extrapolate(coarse.value[i], fine.value[i], coarse_level, level, options.formula.degree));

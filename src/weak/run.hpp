@@ -1,6 +1,7 @@
 #pragma once
 /// A weak approximation as it is asked for: a number of steps, launches to be averaged, Richardson's
 /// extrapolation.
+#include <cstddef>
 #include <cstdint>
 #include <vector>
 
@@ -21,6 +22,8 @@ struct WeakRun {
   bool richardson = false;
   /// Times inside (0, T) at which steps are to end as well, ascending: inputs jump there.
   std::vector<double> jumps = {};
+  /// Whether payoffs have kinks or jumps at several times: the first then has as many steps as alone.
+  bool kinks_at_times = false;
 };
 
 /// Per payoff, time by time where there are several. Standard errors are those of the average of the
@@ -39,10 +42,20 @@ struct WeakResult {
 /// @throws InputError as weak_approximation; if launches or n are 0, or n < 2 with richardson
 WeakResult run_weak(const Model& model, const std::vector<WeakPayoff>& payoffs, const WeakRun& run);
 
-/// Level m of the grid: with one time m steps. With several, m steps to the first, and m f_k, at least 1, in the
-/// k-th interval, f_k the power of 2 next to (T_k - T_{k-1}) / T_k: what a step must be short against is the
-/// time at which it is looked at. With jumps m f_k, at least 1, in each interval between times, of a horizon or of a jump,
-/// f_k the power of 2 next to (T_k - T_{k-1}) / T. All steps together.
+/// Level m of the grid: the steps in each interval. With one time and no jumps m. With several times m f_k, at least 1,
+///
+///     f_k the power of 2 next to (T_k - T_{k-1}) / sqrt(T_k T),
+///
+/// between steps of equal length, which late times need, and steps in proportion to the time at which they are looked
+/// at, which kinks at early times need. To the first time m where payoffs have kinks, otherwise at least 4 (m, where
+/// that is less). With jumps m f_k, at least 1, in each interval between times, of a horizon or of
+/// a jump, f_k the power of 2 next to (T_k - T_{k-1}) / T.
+std::vector<std::size_t> interval_steps(const WeakRun& run, std::size_t m);
+
+/// ceil(n_k / 2) for each interval: the coarser tree of an extrapolation.
+std::vector<std::size_t> halved(std::vector<std::size_t> counts);
+
+/// All steps of level m together.
 std::size_t steps_of_level(const WeakRun& run, std::size_t m);
 
 /// The times in (0, horizon) at which an input of the model jumps.
@@ -51,8 +64,8 @@ std::vector<double> jumps_inside(const Model& model, double horizon);
 /// The level with about run.steps steps, >= 1.
 std::size_t level_of(const WeakRun& run);
 
-/// Fills in the grid of level m and the steps to report at.
-void set_grid(const WeakRun& run, std::size_t m, WeakOptions& options);
+/// Fills in the grid with `counts` steps in the intervals, and the steps to report at.
+void set_grid(const WeakRun& run, const std::vector<std::size_t>& counts, WeakOptions& options);
 
 /// Whether the seed changes the result.
 bool is_random(const WeakOptions& options);

@@ -80,6 +80,10 @@ StepLaw step_law(std::span<const double> u, std::span<const double> w, bool four
 Crossings crossings(const StepLaw& law, double value, double reach) {
   const double target = law.deviation > 0 ? (value - law.mean) / law.deviation : 0;
   if (!(law.deviation > 0)) return {};
+  // No z with |z| < reach gets there.
+  if (std::abs(target) > std::abs(law.b) * reach + std::abs(law.c) * (reach * reach + 1) +
+                             std::abs(law.d) * reach * (reach * reach + 3))
+    return {};
   // Between the zeros of the derivative b - 3 d + 2 c z + 3 d z^2 the law is monotone.
   std::array<double, 4> end{-reach, reach, reach, reach};
   std::size_t ends = 1;
@@ -101,16 +105,18 @@ Crossings crossings(const StepLaw& law, double value, double reach) {
   end[ends] = reach;
   Crossings found;
   for (std::size_t i = 0; i < ends; ++i) {
-    double low = end[i], high = end[i + 1], f_low = law.standard(low) - target;
+    double low = end[i], high = end[i + 1];
+    const double f_low = law.standard(low) - target;
     if ((f_low < 0) == (law.standard(high) - target < 0)) continue;
+    // Newton's method, or the middle where it leaves what is left of the bracket.
+    double z = 0.5 * (low + high);
     for (int k = 0; k < 60; ++k) {
-      const double middle = 0.5 * (low + high), f = law.standard(middle) - target;
-      if ((f < 0) == (f_low < 0))
-        low = middle;
-      else
-        high = middle;
+      const double f = law.standard(z) - target, step = f / (C + z * (B + z * A));
+      if (f == 0 || std::abs(step) <= 1e-15 * reach || high - low <= 1e-15 * reach) break;
+      ((f < 0) == (f_low < 0) ? low : high) = z;
+      z = z - step > low && z - step < high ? z - step : 0.5 * (low + high);
     }
-    found.z[found.count++] = 0.5 * (low + high);
+    found.z[found.count++] = z;
   }
   return found;
 }

@@ -1,4 +1,5 @@
 /// weak: payoffs averaged by the tree, added states, and what is refused.
+#include <fmt/format.h>
 #include <catch2/catch.hpp>
 #include <cmath>
 #include <nlohmann/json.hpp>
@@ -367,6 +368,55 @@ TEST_CASE("weak: several horizons and payoffs from one tree") {
   CHECK(strip[2]["error"].get<double>() < 1e-6);
   CHECK(place.run("weak gbm --horizon 1,0.5 --steps 4 --payoff s").code == 2);
   CHECK(place.run("weak gbm --horizon 0.5,1 --steps 4 --average s --payoff average_s").code == 2);
+}
+
+TEST_CASE("weak: a strip costs at most one and a half times its dearest option") {
+  // 20 strikes and 4 maturities; work in ODE solves. Tolerances are 1e-3 and 1e-4 of the price of the option at the
+  // money in one year. The dearest of some of the options costs no more than the dearest of all.
+  const Workplace place;
+  struct Problem {
+    std::string model;
+    double spot;
+    std::array<std::string, 2> tolerances;
+  };
+  for (const Problem& problem :
+       {Problem{"gbm", 100, {"0.01", "0.001"}}, Problem{"heston", 1, {"1e-4", "1e-5"}}}) {
+    const auto call = [&](int i) {
+      return fmt::format(" --payoff max(s-{},0)", problem.spot * (0.7 + 0.6 * i / 19));
+    };
+    std::string strikes;
+    for (int i = 0; i < 20; ++i) strikes += call(i);
+    for (const std::string& tolerance : problem.tolerances) {
+      const auto solves = [&](const std::string& horizon, const std::string& payoffs) {
+        const auto rows =
+            rows_of(place, problem.model + " --horizon " + horizon + " --tolerance " + tolerance + payoffs);
+        for (const auto& row : rows) CHECK(row["error"].get<double>() <= std::stod(tolerance));
+        return rows.front()["ode_solves"].get<double>();
+      };
+      double dearest = 0;
+      for (const char* horizon : {"0.25", "0.5", "1", "2"})
+        for (int i = 0; i < 20; i += 3) dearest = std::max(dearest, solves(horizon, call(i)));
+      INFO(problem.model << " " << tolerance);
+      CHECK(solves("0.25,0.5,1,2", strikes) <= 1.5 * dearest);
+    }
+  }
+}
+
+TEST_CASE("weak: the options that a tolerance chose reproduce its value for several times") {
+  const Workplace place;
+  const std::string strip = "gbm --horizon 0.25,0.5,2 --payoff max(s-100,0) ";
+  const Outcome outcome = place.run("weak " + strip + "--tolerance 1e-2 --quiet --format json");
+  REQUIRE(outcome.code == 0);
+  const auto json = nlohmann::json::parse(outcome.out);
+  const auto& o = json["options"];
+  const auto again = rows_of(
+      place,
+      strip + fmt::format("--degree {} --steps {} --patch-width {} --rtol {} --atol {} --richardson",
+                          o["degree"].get<int>(), o["steps"].get<int>(), o["patch-width"].get<double>(),
+                          o["rtol"].get<double>(), o["atol"].get<double>()));
+  for (std::size_t i = 0; i < 3; ++i)
+    CHECK(again[i]["extrapolated"].get<double>() ==
+          Approx(json["rows"][i]["value"].get<double>()).epsilon(1e-13));
 }
 
 TEST_CASE("weak: the options that a tolerance chose reproduce its value") {
