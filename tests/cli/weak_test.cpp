@@ -475,7 +475,7 @@ TEST_CASE("weak: what is wrong is one line and exit code 2") {
       {gbm + "--payoff s+", "--payoff"},
       {gbm + "--payoff s --average q", "--average:1:1"},
       {gbm + "--payoff s --average s --average s", "already that of a state"},
-      {gbm + "--payoff s --average r=s", "already that of a state or a parameter"},
+      {gbm + "--payoff s --average r=s", "already that of a state, a parameter"},
       {gbm + "--payoff s --integral s", "NAME=EXPR"},
       {gbm + "--payoff s --discount q", "--discount:1:1"},
       {"weak gbm --horizon 1 --payoff s", "--steps"},
