@@ -1,6 +1,7 @@
 #include "wienertree/filter/component_filter.hpp"
 
 #include <fmt/format.h>
+#include <Eigen/Cholesky>
 
 #include <algorithm>
 #include <cmath>
@@ -104,16 +105,35 @@ void ComponentFilter::advance(const ObservationWindow& window) {
 void ComponentFilter::cross(const ObservationWindow& window, std::span<const double> y) {
   ComponentMerge::drop_negligible(components_, negligible);
   if (components_.size() > options_.nodes) merge_.merge(components_, options_.nodes);
-  if (affine_) return transit(window.length());
+  if (affine_) {
+    forget_what_noise_hides(window.length());
+    return transit(window.length());
+  }
   if (carry(window)) return;
   cross_in_substeps(window, y);
 }
 
+void ComponentFilter::prepare_transition(double length) {
+  if (length == transition_length_) return;
+  transition_ = linear_transition(*affine_, length);
+  transition_length_ = length;
+}
+
+// Components that the noise of a gap leaves indistinguishable are one from now on.
+void ComponentFilter::forget_what_noise_hides(double length) {
+  if (components_.size() < 2) return;
+  prepare_transition(length);
+  const auto d = static_cast<Eigen::Index>(d_);
+  const SmallSquare<Eigen::Dynamic> Q = transition_.Q.topLeftCorner(d, d);
+  const Eigen::LLT<Eigen::MatrixXd> root(Q);
+  if (root.info() != Eigen::Success || root.matrixLLT().diagonal().minCoeff() <= 1e-6 * std::sqrt(Q.trace()))
+    return;
+  merge_.merge_close(components_, root.matrixL().solve(Eigen::MatrixXd(transition_.F.topLeftCorner(d, d))),
+                     0.4 * std::cbrt(options_.substep_tolerance));
+}
+
 void ComponentFilter::transit(double length) {
-  if (length != transition_length_) {
-    transition_ = linear_transition(*affine_, length);
-    transition_length_ = length;
-  }
+  prepare_transition(length);
   const auto d = static_cast<Eigen::Index>(d_);
   Eigen::VectorXd offset = transition_.f.head(d);
   if (model_.has_clock) offset += clock_ * transition_.F.topRightCorner(d, 1);

@@ -41,6 +41,8 @@ class ComponentFilter final : public Filter {
   void start();
   bool one_noise_for_all() const;
   void cross(const ObservationWindow& window, std::span<const double> y);
+  void prepare_transition(double length);
+  void forget_what_noise_hides(double length);
   void transit(double length);
   bool carry(const ObservationWindow& window);
   void cross_in_substeps(const ObservationWindow& window, std::span<const double> y);

@@ -143,10 +143,10 @@ void ComponentMerge::gather(const Patch& patch, const GaussianComponents& from, 
   merged_.log_weight[to] = std::log(mass);
 }
 
-void ComponentMerge::merge(GaussianComponents& c, std::size_t most) {
-  if (c.size() <= most) return;
+// Weights, shares, and the means in coordinates W (m - origin).
+void ComponentMerge::lay_out(const GaussianComponents& c, const Eigen::MatrixXd& W,
+                             const Eigen::VectorXd& origin, double log_mass) {
   const std::size_t d = c.states(), N = c.size();
-  const MixtureMoments law = moments(c);
   white_.reshape(d, N);
   weight_.resize(N);
   share_.resize(N);
@@ -154,25 +154,39 @@ void ComponentMerge::merge(GaussianComponents& c, std::size_t most) {
   order_.resize(N);
   double roots = 0;
   for (std::size_t n = 0; n < N; ++n) {
-    weight_[n] = std::exp(c.log_weight[n] - law.log_mass);
+    weight_[n] = std::exp(c.log_weight[n] - log_mass);
     roots += std::sqrt(weight_[n]);
     order_[n] = static_cast<std::uint32_t>(n);
   }
   for (std::size_t n = 0; n < N; ++n)
     share_[n] = 0.7 * std::sqrt(weight_[n]) / roots + 0.3 / static_cast<double>(N);
-  const Whitening<Eigen::Dynamic> white{SmallSquare<Eigen::Dynamic>(law.covariance)};
   for (std::size_t i = 0; i < d; ++i) {
     double* out = white_.component(i).data();
     std::fill_n(out, N, 0.0);
     for (std::size_t j = 0; j < d; ++j) {
-      const double factor = white.whitening(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j));
-      const double mean = law.mean(static_cast<Eigen::Index>(j));
+      const double factor = W(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j));
+      const double mean = origin(static_cast<Eigen::Index>(j));
       const double* x = c.mean.component(j).data();
       for (std::size_t n = 0; n < N; ++n) out[n] += factor * (x[n] - mean);
     }
   }
+}
+
+// Each patch becomes one component.
+void ComponentMerge::join(GaussianComponents& c, double log_mass) {
+  merged_.reshape(c.states(), patches_.size());
+  for (std::size_t k = 0; k < patches_.size(); ++k) gather(patches_[k], c, k);
+  for (double& w : merged_.log_weight) w += log_mass;
+  c.swap(merged_);
+}
+
+void ComponentMerge::merge(GaussianComponents& c, std::size_t most) {
+  if (c.size() <= most) return;
+  const MixtureMoments law = moments(c);
+  const Whitening<Eigen::Dynamic> white{SmallSquare<Eigen::Dynamic>(law.covariance)};
+  lay_out(c, white.whitening, law.mean, law.log_mass);
   patches_.clear();
-  open_.assign(1, {0, N, most});
+  open_.assign(1, {0, c.size(), most});
   while (!open_.empty()) {
     const Patch patch = open_.back();
     open_.pop_back();
@@ -187,10 +201,56 @@ void ComponentMerge::merge(GaussianComponents& c, std::size_t most) {
       open_.push_back({patch.first, at, patch.parts / 2});
     }
   }
-  merged_.reshape(d, patches_.size());
-  for (std::size_t k = 0; k < patches_.size(); ++k) gather(patches_[k], c, k);
-  for (double& w : merged_.log_weight) w += law.log_mass;
-  c.swap(merged_);
+  join(c, law.log_mass);
+}
+
+bool ComponentMerge::is_close(const Patch& patch, const GaussianComponents& c, const Eigen::MatrixXd& W,
+                              double width) const {
+  const auto d = static_cast<Eigen::Index>(c.states());
+  double mass = 0;
+  Eigen::VectorXd mean = Eigen::VectorXd::Zero(d);
+  Eigen::MatrixXd P = Eigen::MatrixXd::Zero(d, d);
+  const auto covariance = [&](std::size_t n) {
+    return Eigen::MatrixXd(square_of<Eigen::Dynamic>(c.covariance, c.states(), n));
+  };
+  for (std::size_t k = patch.first; k < patch.last; ++k) {
+    const std::size_t n = order_[k];
+    mass += weight_[n];
+    mean += weight_[n] * vector_of<Eigen::Dynamic>(white_, c.states(), n);
+    P += weight_[n] * covariance(n);
+  }
+  if (!(mass > 0)) return true;
+  mean /= mass;
+  P /= mass;
+  Eigen::MatrixXd spread = Eigen::MatrixXd::Zero(d, d);
+  double square = 0;
+  for (std::size_t k = patch.first; k < patch.last; ++k) {
+    const std::size_t n = order_[k];
+    const Eigen::VectorXd e = vector_of<Eigen::Dynamic>(white_, c.states(), n) - mean;
+    spread += weight_[n] / mass * e * e.transpose();
+    square += weight_[n] / mass * (W * (covariance(n) - P) * W.transpose()).squaredNorm();
+  }
+  return square <= width * width && SymmetricEigen<Eigen::Dynamic>(spread).values(d - 1) <= width * width;
+}
+
+void ComponentMerge::merge_close(GaussianComponents& c, const Eigen::MatrixXd& W, double width) {
+  if (c.size() < 2) return;
+  const MixtureMoments law = moments(c);
+  lay_out(c, W, law.mean, law.log_mass);
+  patches_.clear();
+  open_.assign(1, {0, c.size(), 2});
+  while (!open_.empty()) {
+    const Patch patch = open_.back();
+    open_.pop_back();
+    if (patch.last - patch.first == 1 || is_close(patch, c, W, width)) {
+      patches_.push_back(patch);
+      continue;
+    }
+    const std::size_t at = cut(patch);
+    open_.push_back({at, patch.last, 2});
+    open_.push_back({patch.first, at, 2});
+  }
+  if (patches_.size() < c.size()) join(c, law.log_mass);
 }
 
 }  // namespace wienertree

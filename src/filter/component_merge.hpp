@@ -23,6 +23,11 @@ class ComponentMerge {
  public:
   /// Into at most `most` components, in place; does nothing where there are not more.
   void merge(GaussianComponents& components, std::size_t most);
+  /// Those that noise to come makes indistinguishable: patches are cut, in coordinates z = W m in which that noise is
+  /// standard, until the means of each have a standard deviation of at most `width` in every direction, and its
+  /// covariances W P W^T one of at most `width` in Frobenius' norm. What merging loses is, relative to the density
+  /// afterwards, a third cumulant of at most width^3 times the skewness of the patch.
+  void merge_close(GaussianComponents& components, const Eigen::MatrixXd& W, double width);
   /// Drops components whose weight is below `part` of the largest.
   static void drop_negligible(GaussianComponents& components, double part);
 
@@ -30,10 +35,15 @@ class ComponentMerge {
   struct Patch {
     std::size_t first, last, parts;
   };
+  void lay_out(const GaussianComponents& components, const Eigen::MatrixXd& W, const Eigen::VectorXd& origin,
+               double log_mass);
+  void join(GaussianComponents& components, double log_mass);
+  bool is_close(const Patch& patch, const GaussianComponents& components, const Eigen::MatrixXd& W,
+                double width) const;
   std::size_t cut(const Patch& patch);
   void gather(const Patch& patch, const GaussianComponents& from, std::size_t to);
 
-  Batch white_;  ///< d x N: means in the whole law's coordinates
+  Batch white_;  ///< d x N: means in the coordinates in which patches are cut
   std::vector<double> weight_, share_, place_;
   std::vector<std::uint32_t> order_;
   std::vector<Patch> open_, patches_;

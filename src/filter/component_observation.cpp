@@ -42,7 +42,9 @@ void ComponentFilter::weigh(const ObservationWindow& window, std::span<const dou
 // Divides what the likelihood calls for, and conditions.
 double ComponentFilter::take_in(std::span<const double> y, double clock, std::size_t nodes) {
   const ComponentUpdate::Limits limits{0.25 * options_.substep_tolerance, (d_ == 2 ? 24 : 8) * nodes};
+  const std::uint64_t before = update_->conditioned();
   const double left = update_->condition(y, clock, limits, components_, &threads_);
+  statistics_.conditioned += update_->conditioned() - before;
   if (components_.size() > 8 * nodes) merge_.merge(components_, 8 * nodes);
   return left;
 }

@@ -110,6 +110,7 @@ double ComponentUpdate::condition(std::span<const double> y, double clock, const
                                   GaussianComponents& components, ThreadPool* threads) {
   prior_ = components;
   conditioning_.condition(y, clock, components, threads);
+  conditioned_ += components.size();
   if (expansion().linear_gaussian()) return 0;
   const std::size_t d = components.states();
   accepted_.reshape(d, 0);
@@ -146,6 +147,7 @@ double ComponentUpdate::condition(std::span<const double> y, double clock, const
     prior_.swap(parts_);
     components = prior_;
     conditioning_.condition(y, clock, components, threads);
+    conditioned_ += components.size();
   }
   components.swap(accepted_);
   const double left = root_mean_square(components, spread_);

@@ -31,6 +31,7 @@ class ComponentUpdate {
   /// exceeds the tolerance by far: they were too many; else 0
   double condition(std::span<const double> y, double clock, const Limits& limits,
                    GaussianComponents& components, ThreadPool* threads);
+  std::uint64_t conditioned() const { return conditioned_; }  ///< components, so far
   const ObservationExpansion& expansion() const { return conditioning_.expansion(); }
 
  private:
@@ -47,6 +48,7 @@ class ComponentUpdate {
   std::vector<Division> divisions_;
   std::vector<std::uint8_t> divided_;
   std::vector<double> spread_;  ///< of accepted components
+  std::uint64_t conditioned_ = 0;
 };
 
 }  // namespace wienertree

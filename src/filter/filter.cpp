@@ -114,7 +114,7 @@ void exchange(StateArchive& archive, LikelihoodRatio& ratio) {
 
 void exchange(StateArchive& archive, FilterStatistics& s) {
   archive(s.flow.node_segments, s.flow.field_evaluations, s.flow.cvode_nodes, s.steps, s.children,
-          s.dropped_nodes, s.discarded);
+          s.dropped_nodes, s.conditioned, s.discarded);
 }
 
 void exchange(StateArchive& archive, FilterWarning& warning) {

@@ -27,7 +27,9 @@ struct FilterStatistics {
   std::uint64_t steps = 0;
   std::uint64_t children = 0;       ///< nodes grown, over all steps
   std::uint64_t dropped_nodes = 0;  ///< nodes that could not be moved and were dropped, as asked
-  double discarded = 0;             ///< sum of Selection::discarded over the steps
+  std::uint64_t conditioned =
+      0;                 ///< components confronted with an observation, parts of divided ones among them
+  double discarded = 0;  ///< sum of Selection::discarded over the steps
 };
 
 void exchange(StateArchive& archive, FilterStatistics& statistics);

@@ -125,7 +125,7 @@ std::optional<CubatureFormula> other_degree(int degree, const Model& model,
 double work_of(const FilterStatistics& s, std::size_t dimension) {
   const auto d = static_cast<double>(dimension);
   return (1 + d / 4) * static_cast<double>(s.flow.node_segments) +
-         (1 + d / 2) * static_cast<double>(s.children);
+         (1 + d / 2) * static_cast<double>(s.children) + 40 * d * static_cast<double>(s.conditioned);
 }
 
 }  // namespace wienertree

@@ -321,7 +321,16 @@ bool ControlledFilter::advance() {
       }
       return false;
     }
-    current_ = std::make_unique<Run>(model_, *std::move(plan));
+    const RunRole role = plan->role;
+    const int level = plan->level;
+    try {
+      current_ = std::make_unique<Run>(model_, *std::move(plan));
+    } catch (const InputError& refusal) {
+      // A finer run that there is no memory for; without any answer it is the caller's to know.
+      if (answer_level() < 1) throw;
+      finished_.push_back({role, level, {}, {}, {}, refusal.message(), refusal.where(), refusal.value()});
+      return true;
+    }
     const ObservationWindows& w = current_->plan.windows;
     if (w.size() == 0 || w.time(0) > w.start()) {
       current_->result.rows.emplace_back();

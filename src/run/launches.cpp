@@ -118,6 +118,7 @@ FilterStatistics Launches::statistics() const {
     all.steps = s.steps;
     all.children += s.children;
     all.dropped_nodes += s.dropped_nodes;
+    all.conditioned += s.conditioned;
     all.discarded += s.discarded;
   }
   return all;

@@ -146,3 +146,34 @@ TEST_CASE("parts of a wide component have its mass, mean and covariance, and lea
     }
   }
 }
+
+TEST_CASE("components that noise to come hides become one, others stay, with the moments of the whole") {
+  // Three groups, one of them of unlike covariances; noise of standard deviations 1 and 0.1.
+  GaussianComponents c;
+  const std::size_t N = 90;
+  c.reshape(2, N);
+  for (std::size_t n = 0; n < N; ++n) {
+    const std::size_t group = n % 3;
+    const double k = static_cast<double>(n / 3) / 29 - 0.5;
+    c.log_weight[n] = 3 - static_cast<double>(group) / 2 + k;
+    c.mean(0, n) = 5 * static_cast<double>(group) + 0.2 * k;
+    c.mean(1, n) = 0.02 * k * k;
+    c.covariance(0, n) = 0.01 + (group == 2 && k > 0 ? 3.0 : 0.0);
+    c.covariance(1, n) = c.covariance(2, n) = 1e-4;
+    c.covariance(3, n) = 1e-4;
+  }
+  const MixtureMoments before = moments(c);
+  const Eigen::MatrixXd W = Eigen::Vector2d(1, 10).asDiagonal();
+  ComponentMerge merge;
+  GaussianComponents fine = c;
+  merge.merge_close(c, W, 0.2);
+  CHECK(c.size() >= 4);  // cuts halve shares, so that groups may be divided
+  CHECK(c.size() <= 16);
+  const MixtureMoments after = moments(c);
+  CHECK(after.log_mass == Approx(before.log_mass).epsilon(1e-13));
+  CHECK(after.mean.isApprox(before.mean, 1e-12));
+  CHECK(after.covariance.isApprox(before.covariance, 1e-12));
+  // Not so where the noise is narrow beside the groups.
+  merge.merge_close(fine, 1000 * W, 0.2);
+  CHECK(fine.size() > 60);
+}
