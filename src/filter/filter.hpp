@@ -25,7 +25,7 @@ namespace wienertree {
 struct FilterStatistics {
   FlowStatistics flow;
   std::uint64_t steps = 0;
-  std::uint64_t children = 0;       ///< nodes grown, over all steps
+  std::uint64_t children = 0;       ///< nodes grown, or cells of a grid moved, over all steps
   std::uint64_t dropped_nodes = 0;  ///< nodes that could not be moved and were dropped, as asked
   std::uint64_t conditioned =
       0;                 ///< components confronted with an observation, parts of divided ones among them

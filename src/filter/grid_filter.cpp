@@ -161,6 +161,7 @@ void GridFilter::guarded_step(double s, std::span<const double> slope, const Obs
 }
 
 void GridFilter::step(double s, std::span<const double> slope, const ObservationWindow& window) {
+  statistics_.children += density_.grid().cells;
   if (slope.empty()) return transport(s);
   const double noise = rounding * density_.largest();
   fields_.potential(slope, bridge_, log_factor_, correction_);

@@ -275,6 +275,13 @@ std::optional<ControlledFilter::Plan> ControlledFilter::next_guard(int level) co
   return {};
 }
 
+// No resolution helps against what the spacing of the rows leaves.
+bool ControlledFilter::rows_too_far_apart(int level) const {
+  const FinishedRun *rows = find(RunRole::rows, level), *run = find(RunRole::level, level);
+  if (rows == nullptr || rows->failed() || run == nullptr || run->failed()) return false;
+  return !largest(differences(run->rows, rows->rows)).within(control_.tolerance);
+}
+
 std::optional<ControlledFilter::Plan> ControlledFilter::next() const {
   if (setup_.random || alone()) {
     if (find(RunRole::level, 1) == nullptr) return plan(RunRole::level, 1);
@@ -293,11 +300,12 @@ std::optional<ControlledFilter::Plan> ControlledFilter::next() const {
   // Steps that are given leave an error that more nodes do nothing for; the guards tell it once, in the end.
   const RowErrors by_levels = control_.steps ? difference_of_levels(level) : errors_of(level);
   const bool promising = largest(by_levels).within(control_.tolerance), more = affordable(level + 1);
-  if (!promising && more) return plan(RunRole::level, level + 1);
+  const bool refines = more && !rows_too_far_apart(level - 1);
+  if (!promising && refines) return plan(RunRole::level, level + 1);
   // The best there will be: its guards, unless the work is spent.
   if (promising || work_ < control_.work)
     if (auto guard = next_guard(level - 1)) return guard;
-  if (!control_.steps && more && !largest(errors_of(level)).within(control_.tolerance))
+  if (!control_.steps && refines && !largest(errors_of(level)).within(control_.tolerance))
     return plan(RunRole::level, level + 1);
   return {};
 }

@@ -112,6 +112,7 @@ class ControlledFilter {
   RowErrors difference_of_levels(int level) const;  ///< from the level below; empty where there is none
   RowErrors errors_of(int level) const;
   std::string missing_guard() const;
+  bool rows_too_far_apart(int level) const;
   bool affordable(int level) const;
   bool closed_form() const;
   bool alone() const;  ///< whether there is one level only
