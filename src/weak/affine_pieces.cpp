@@ -23,7 +23,7 @@ class Places {
       const double t = static_cast<double>(n) / (places - 1);
       s_[n] = s * std::pow(10, 6 * t - 3) * (1 + 0.1 * std::sin(1 + 7 * t));
       for (std::size_t i = 0; i < start.size(); ++i)
-        x_(i, n) = i != price    ? start[i] + 0.1 * std::abs(start[i]) * std::sin(3 + 11 * t)
+        x_(i, n) = i != price    ? start[i] + (0.1 * std::abs(start[i]) + 0.01) * (1 + std::sin(3 + 11 * t))
                    : logarithmic ? std::log(s_[n])
                                  : s_[n];
     }

@@ -25,7 +25,8 @@ struct AffinePieces {
 
 /// Of a payoff that depends on the price alone; nothing where it is not of this kind. Branches and arguments of kinks are
 /// functions of the elementary kind, which are affine everywhere if they are at a dozen places in no special position.
-/// @param start a state; the price is at 1e-3 to 1e3 times its value there, and the other states near theirs
+/// @param start a state; the price is at 1e-3 to 1e3 times its value there, and the other states near theirs but not
+/// there, also those that start from 0 as integrals do
 /// @param logarithmic whether the state is the price's logarithm
 std::optional<AffinePieces> affine_pieces(const KinkedFunction& f, const std::vector<double>& start,
                                           std::size_t price, bool logarithmic);

@@ -108,6 +108,10 @@ TEST_CASE("payoffs that are affine between kinks are averaged in closed form as 
   for (const char* payoff :
        {"max(s - 100, 0)^2", "max(s*v - 100, 0)", "sqrt(max(s, 1))", "v*s", "max(log(s), 0)"})
     CHECK_FALSE(affine_pieces(model.compile_kinked(payoff, "payoff"), model.model().initial, 0, false));
+  // States that start from 0, as integrals do, are looked at elsewhere.
+  const TextModel longer = model.with_integrals({{"total", "v", "--integral"}});
+  for (const char* payoff : {"total", "max(s - 100, 0) + total", "if(total > 0.005, s, 0)"})
+    CHECK_FALSE(affine_pieces(longer.compile_kinked(payoff, "payoff"), longer.model().initial, 0, false));
 }
 
 TEST_CASE("Heston's model is recognised however it is written") {
