@@ -119,7 +119,7 @@ void ComponentFilter::prepare_transition(double length) {
   transition_length_ = length;
 }
 
-// Components that the noise of a gap leaves indistinguishable are one from now on.
+// Components that the noise of a gap, in all directions, leaves indistinguishable are one from now on.
 void ComponentFilter::forget_what_noise_hides(double length) {
   if (components_.size() < 2) return;
   prepare_transition(length);

@@ -230,7 +230,8 @@ bool ComponentMerge::is_close(const Patch& patch, const GaussianComponents& c, c
     spread += weight_[n] / mass * e * e.transpose();
     square += weight_[n] / mass * (W * (covariance(n) - P) * W.transpose()).squaredNorm();
   }
-  return square <= width * width && SymmetricEigen<Eigen::Dynamic>(spread).values(d - 1) <= width * width;
+  return square <= width * width * width &&
+         SymmetricEigen<Eigen::Dynamic>(spread).values(d - 1) <= width * width;
 }
 
 void ComponentMerge::merge_close(GaussianComponents& c, const Eigen::MatrixXd& W, double width) {

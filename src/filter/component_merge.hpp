@@ -25,8 +25,8 @@ class ComponentMerge {
   void merge(GaussianComponents& components, std::size_t most);
   /// Those that noise to come makes indistinguishable: patches are cut, in coordinates z = W m in which that noise is
   /// standard, until the means of each have a standard deviation of at most `width` in every direction, and its
-  /// covariances W P W^T one of at most `width` in Frobenius' norm. What merging loses is, relative to the density
-  /// afterwards, a third cumulant of at most width^3 times the skewness of the patch.
+  /// covariances W P W^T one of at most width^(3/2) in Frobenius' norm. What merging loses of the law afterwards is a
+  /// third cumulant of at most width^3 times the skewness of the patch, and a fourth of at most 3 width^3.
   void merge_close(GaussianComponents& components, const Eigen::MatrixXd& W, double width);
   /// Drops components whose weight is below `part` of the largest.
   static void drop_negligible(GaussianComponents& components, double part);

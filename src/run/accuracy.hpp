@@ -51,7 +51,8 @@ std::optional<CubatureFormula> other_degree(int degree, const Model& model,
                                             const std::filesystem::path& formulas);
 
 /// Work in node-steps, counted by this table and never by the clock: moving a node of dimension d along a segment
-/// costs 1 + d/4, weighing and thinning a child 1 + d/2, confronting a component with an observation 40 d. A node-step takes about 0.1 microseconds of one core.
+/// costs 1 + d/4, weighing and thinning a child or moving a cell of a grid 1 + d/2, confronting a component with an
+/// observation 40 d. A node-step takes about 0.1 microseconds of one core.
 double work_of(const FilterStatistics& statistics, std::size_t dimension);
 
 }  // namespace wienertree

@@ -223,7 +223,7 @@ RowErrors ControlledFilter::errors_of(int level) const {
   const int guarded = alone() ? level : level - 1;
   const FinishedRun* below = find(RunRole::level, guarded);
   errors = difference_of_levels(level);
-  for (const RunRole role : {RunRole::steps, RunRole::nodes, RunRole::degree, RunRole::rows}) {
+  for (const auto& [role, name] : guards) {
     const FinishedRun* run = find(role, guarded);
     if (run == nullptr || run->failed() || below == nullptr || below->failed()) continue;
     RowErrors some = differences(run->rows, below->rows);

@@ -5,6 +5,7 @@
 
 #include "wienertree/filter/simulate.hpp"
 #include "wienertree/model/text_model.hpp"
+#include "wienertree/numeric/memory.hpp"
 #include "wienertree/run/controlled_filter.hpp"
 
 using namespace wienertree;
@@ -96,6 +97,79 @@ TEST_CASE("what is given stays, and an error above the tolerance is told") {
   CHECK_FALSE(filter.accuracy().reached);
   REQUIRE_FALSE(filter.warnings().empty());
   CHECK(filter.warnings().back().find("1e-07") != std::string::npos);
+}
+
+TEST_CASE("nodes are not doubled for what steps that are given leave") {
+  const Model model = scalar_model("x - x^3", continuous);
+  const ObservationPath y = simulate(model, 2, 2000, 1000, 5, 0).observations;
+  GivenOptions given = klv();
+  given.degree = 3;
+  ControlOptions options = control();
+  options.steps = 10;
+  options.tolerance = 1e-3;
+  const ControlledFilter filter = searched(model, given, options, y);
+  CHECK_FALSE(filter.accuracy().reached);
+  CHECK(filter.answer_setup().options.nodes <= 120);  // 61440 were tried once
+}
+
+TEST_CASE("an error is not known where the run that would tell it was given up") {
+  const Model model = scalar_model("-x", discrete);
+  const ObservationPath y = simulate(model, 8, 4000, 20, 5, 0).observations;
+  GivenOptions given = klv();
+  given.conditioning = Conditioning::children;
+  given.nodes = 400;
+  ControlOptions options = control();
+  options.nodes_given = true;
+  options.steps = 80;
+  const ControlledFilter whole = searched(model, given, options, y);
+  REQUIRE(whole.accuracy().known);
+  // Enough for the two levels, and too little for the run of twice the steps.
+  options.work = 0.45 * whole.work();
+  const ControlledFilter cut = searched(model, given, options, y);
+  REQUIRE(cut.answer().level == 1);
+  CHECK_FALSE(cut.accuracy().known);
+  CHECK_FALSE(cut.accuracy().reached);
+  REQUIRE_FALSE(cut.warnings().empty());
+  CHECK(cut.warnings().back().find("the error is not known: the run with") == 0);
+  CHECK(cut.warnings().back().find("the work is spent") != std::string::npos);
+}
+
+TEST_CASE("what the spacing of rows leaves is told without finer levels, and cells of a grid are work") {
+  const Model model = scalar_model("-x", continuous);
+  ObservationPath y{1, {}, {}};
+  y.append(0, std::vector{0.0});
+  y.append(1, std::vector{1.0});
+  GivenOptions given;
+  given.method = FilterMethod::grid;
+  const ControlledFilter filter = searched(model, given, control(), y);
+  CHECK_FALSE(filter.accuracy().reached);
+  CHECK(filter.answer().level <= 2);
+  CHECK(filter.work() > 1000);
+  CHECK(filter.work() < 1e6);
+}
+
+TEST_CASE("components that are divided are work, and a level without memory leaves the answer below it") {
+  const Model ring = parse_model(
+      "name = \"ring\"\nconvention = \"ito\"\n[state]\nx = { initial = 0.5 }\nz = { initial = 0 }\n"
+      "[drift]\nx = \"-x\"\nz = \"-z\"\n[diffusion]\nx = [0.7, 0]\nz = [0, 0.7]\n[observation]\n"
+      "kind = \"discrete\"\nh = [\"sin(3*x)*cos(2*z)\"]\nnoise = { law = \"gaussian\", sd = 0.05 }\n",
+      "ring.toml", {});
+  ObservationPath y{1, {}, {}};
+  for (const double t : {0.5, 1.0}) y.append(t, std::vector{0.3});
+  ControlOptions options = control();
+  options.tolerance = 1e-9;
+  options.work = 3e6;
+  const ControlledFilter filter = searched(ring, klv(), options, y);
+  CHECK(filter.answer().statistics.conditioned > 100);
+  CHECK(filter.work() > 80 * static_cast<double>(filter.answer().statistics.conditioned));
+  CHECK(filter.work() < 1e8);
+  const double limit = memory_limit();
+  set_memory_limit(4e6);  // 400 nodes take 2.2 MB, the next level four times that
+  options.work = 1e12;
+  const ControlledFilter small = searched(ring, klv(), options, y);
+  set_memory_limit(limit);
+  CHECK(small.answer().level >= 1);
+  CHECK_FALSE(small.accuracy().reached);
 }
 
 TEST_CASE("a search that is put down goes on to the same answer") {
